@@ -34,6 +34,7 @@ def check_campaign(
     checks.drive()
     checks.loads()
     checks.external()
+    checks.instruments()
     checks.fields()
     checks.encoders()
     checks.bands()
@@ -69,6 +70,13 @@ class _Checks:
                 self._note(key, f"there is no effect '{name}'", did_you_mean(name, known))
             elif found.crossed and len(self.campaign.rig.joints) < 2:
                 self._note(key, f"'{name}' depends on another joint, and there is one alone", "leave it out")
+
+    def instruments(self) -> None:
+        """What an accelerometer or gyro reads says something only of a place."""
+        for topic in (self.campaign.topics.accelerometer, self.campaign.topics.gyro):
+            if topic is not None and topic.key not in self.campaign.rig.instruments:
+                what = f"nothing says where the {topic.key} is"
+                self._note(("topics", topic.key), what, f"describe [{topic.key}] in a parameter file")
 
     def drive(self) -> None:
         """Commands drive a controller and a drive on every joint; a motion is measured angles or rates."""

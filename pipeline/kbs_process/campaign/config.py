@@ -61,7 +61,8 @@ class Bands:
 class Topic:
     """Where a stream of the pipeline is in a recording."""
 
-    key: str  # the stream: "wrench", "effort", "angle", "rate", "command", "field", "temperature" or "pointing"
+    key: str  # the stream: "wrench", "effort", "angle", "rate", "command", "field", "temperature", "pointing",
+    # "accelerometer" or "gyro"
     topic: str
     fields: tuple[str, ...]  # place of each channel in a message: "wrench.force.x", "position[az]"
     channels: tuple[str, ...]  # names of the channels: "Fx"; "az"; "az.rate"
@@ -81,6 +82,8 @@ class Topics:
     field: Topic | None
     temperature: Topic | None
     pointing: Topic | None  # angles by an external instrument
+    accelerometer: Topic | None = None
+    gyro: Topic | None = None
 
     def present(self) -> tuple[Topic, ...]:
         """Return the streams that the campaign names, loads first."""
@@ -93,6 +96,8 @@ class Topics:
             self.field,
             self.temperature,
             self.pointing,
+            self.accelerometer,
+            self.gyro,
         )
         return tuple(stream for stream in streams if stream is not None)
 
@@ -149,6 +154,7 @@ class Campaign:
     rig: Rig
     inputs: tuple[Path, ...]  # files of the description: campaign.toml, parameter files, CSV matrices
     mission: Path | None = None  # orbit, relay satellites and limits of a reference day
+    mast: Path | None = None  # modes of the unit on its mast; None: rigid
     pointing: tuple[PointingRequirement, ...] = ()  # of recordings
     flight_pointing: tuple[PointingRequirement, ...] = ()  # of the flight model alone
     document: dict[str, str] = field(default_factory=dict)  # number, revision, operator, serial_number, date

@@ -94,8 +94,13 @@ def _read_each(folder: Path, files: Iterable[str], key: str) -> list[Document]:
 def _campaign(
     folder: Path, file: CampaignFile, document: Document, tables: Merged, rig: Rig, problems: Problems
 ) -> Campaign:
-    given = file.model.modal if file.model else None
-    modal = within(folder, given, where=document.place(("model", "modal"))) if given else None
+    modal, mast = (
+        within(folder, name, where=document.place(key)) if name else None
+        for key, name in (
+            (("model", "modal"), file.model and file.model.modal),
+            (("mission", "mast"), file.mission and file.mission.mast),
+        )
+    )
     requirements = (
         disturbance(table, ("requirement", index), document, problems) for index, table in enumerate(file.requirement)
     )
@@ -120,8 +125,9 @@ def _campaign(
             document.path,
             *(entry.path for entry in tables.documents),
             *_matrices(folder, tables.tree),
-            *(() if modal is None else (modal,)),
+            *(path for path in (modal, mast) if path is not None),
         ),
+        mast=mast,
         mission=within(folder, file.mission.file, where=document.place(("mission", "file"))) if file.mission else None,
         pointing=pointing(file.pointing, ("pointing",), document, problems),
         flight_pointing=pointing(
@@ -174,6 +180,15 @@ def _topics(named: TopicsTable, rig: Rig) -> Topics:
         field=topic(named.field, "field", position, dict.fromkeys(joints, "rad")),
         temperature=topic(named.temperature, "temperature", ("temperature",), {"temperature": "degC"}),
         pointing=topic(named.pointing, "pointing", position, joints),
+        accelerometer=topic(
+            named.accelerometer,
+            "accelerometer",
+            tuple(f"linear_acceleration.{axis}" for axis in "xyz"),
+            dict.fromkeys("xyz", "m/s^2"),
+        ),
+        gyro=topic(
+            named.gyro, "gyro", tuple(f"angular_velocity.{axis}" for axis in "xyz"), dict.fromkeys("xyz", "rad/s")
+        ),
     )
 
 

@@ -12,12 +12,14 @@ from kbs_process.campaign.documents import Document, dotted, read
 from kbs_process.campaign.formats.faults import checked
 from kbs_process.campaign.formats.mission_file import LimitsTable, MissionFile, OrbitTable, SectionEntry
 from kbs_process.campaign.formats.tables import Table, quantities
+from kbs_process.campaign.modal_file import read_modal
 from kbs_process.campaign.problems import Problems
 from kbs_process.campaign.quantities import quantity_or_fault
 from kbs_process.campaign.requirements import pointing
 from kbs_process.errors import ConfigError
 from kbs_process.mission.model import Limits, Mission, Orbit, Relay
 from kbs_process.mission.planner import Plan
+from kbs_process.plant.linear.modal import ModalTable
 from kbs_process.rig.model import Quantity
 
 
@@ -32,6 +34,7 @@ class Day:
     lead: float  # s, simulated before the day begins
     smoothing: float  # s
     quantities: tuple[Quantity, ...]
+    mast: ModalTable | None = None  # None: rigid
 
 
 def load_day(campaign: Campaign) -> Day:
@@ -46,6 +49,9 @@ def load_day(campaign: Campaign) -> Day:
     if campaign.rig.controller is None:
         what = "a mission is flown by commands, and the rig has no controller"
         raise ConfigError(what, where=description, remedy="describe [controller] in a parameter file")
+    if campaign.mast is not None and campaign.rig.transducer.stiffness is not None:
+        what = "the interface yields by transducer.stiffness, and by [mission] mast once more"
+        raise ConfigError(what, where=description, remedy="leave one of the two out")
     document = read(campaign.mission, role="the mission file", remedy="correct [mission] file in campaign.toml")
     problems = Problems(subject=str(campaign.folder))
     file = checked(document, MissionFile, problems)
@@ -76,6 +82,7 @@ def load_day(campaign: Campaign) -> Day:
         lead=day["lead"],
         smoothing=day["smoothing"],
         quantities=tuple(reader.found),
+        mast=None if campaign.mast is None else read_modal(campaign.mast, campaign.rig.joint_names),
     )
 
 

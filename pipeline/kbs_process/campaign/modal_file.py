@@ -25,7 +25,7 @@ def read_modal(path: Path, joints: Collection[str]) -> ModalTable:
     Raises ConfigError with the file, the key and the remedy.
     """
     problems = Problems(subject=str(path))
-    document = read(path, role="the modal file", remedy="correct [model] modal in campaign.toml, or add the file")
+    document = read(path, role="the modal file", remedy="correct its name in campaign.toml, or add the file")
     file = checked(document, ModalFile, problems)
     if file.joint not in joints:
         problems.add(document.place(("joint",)), f"there is no joint '{file.joint}'", did_you_mean(file.joint, joints))

@@ -18,6 +18,7 @@ from kbs_process.campaign.formats.parameter_file import (
     DriveTable,
     EffortTable,
     ExternalTable,
+    InertialTable,
     JointTable,
     ParameterFile,
     TransducerTable,
@@ -37,6 +38,7 @@ from kbs_process.rig.model import (
     Effort,
     Encoder,
     External,
+    Inertial,
     Joint,
     JointType,
     Quantity,
@@ -78,6 +80,11 @@ class RigBuilder:
             controller=self._controller(controller, joints) if controller else None,
             spacecraft=Spacecraft(**self._quantities(spacecraft, "spacecraft")) if spacecraft else None,
             external=tuple(self._external(name, table, links) for name, table in given.external.items()),
+            instruments={
+                name: self._inertial(name, table, links)
+                for name, table in (("accelerometer", given.accelerometer), ("gyro", given.gyro))
+                if table is not None
+            },
         )
 
     def _quantities(
@@ -236,6 +243,11 @@ class RigBuilder:
         return External(
             name=effect, on=table.on, parameters=parameters, **({"point": None} | self._quantities(table, *key))
         )
+
+    def _inertial(self, name: str, table: InertialTable, links: set[str]) -> Inertial:
+        if table.on not in links:
+            self._unknown((name, "on"), table.on, "link", links)
+        return Inertial(on=table.on, **self._quantities(table, name))
 
     def _unknown(self, key: Key, found: str, role: str, known: Iterable[str]) -> None:
         self.problems.add(self.tables.place(key), f"'{found}' is no {role}", did_you_mean(found, known))

@@ -62,7 +62,7 @@ def stability(campaign: Campaign, **options: Any) -> Outcome:
         "modal campaign/EL089 modes.toml --at 70 --at 75 --at 80 --at 87",
         "modal campaign/EL089 modes.toml --f06 70 fem70.f06 --f06 87 fem87.f06 --interface 100 --ground 101",
     ),
-    checksums=False,
+    recordings=False,
 )
 def modal(
     campaign: Campaign,
@@ -78,6 +78,7 @@ def modal(
     """Write a modal FILE for CAMPAIGN: derived from its plant, or read from Nastran's f06 files.
 
     [model] modal in campaign.toml names the file; the report then sends the rigid-base wrench through these modes.
+    [mission] mast names one of the unit on its mast, for a reference day.
     """
     if bool(angles) == bool(f06):
         raise click.UsageError("Give --at for modes of the plant, or --f06 for modes of Nastran.")

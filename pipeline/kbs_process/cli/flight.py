@@ -13,11 +13,13 @@ if TYPE_CHECKING:
     from kbs_process.campaign.config import Campaign
     from kbs_process.results.outcome import Outcome
 
+_SEED = click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the draw.")
+
 
 @verb(
     *commanded_by("Commands from a table, as for simulate."),
     click.option("--samples", type=click.IntRange(2), default=200, show_default=True, help="Units to fly."),
-    click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the draw."),
+    _SEED,
     example=("flight campaign/EL089", "flight campaign/EL089 --command slew.csv --samples 500 --seed 3"),
     output="results/NAME-flight",
     pdf=True,
@@ -37,8 +39,16 @@ def flight(campaign: Campaign, trajectory: str | None, command: Path | None, **o
 
 
 @verb(
+    click.option(
+        "--samples",
+        type=click.IntRange(0),
+        default=16,
+        show_default=True,
+        help="Units that fly the day beside the nominal one; fewer than two: none.",
+    ),
+    _SEED,
     campaign="campaign/REFDAY",
-    example=("reference-day", "reference-day campaign/REFDAY --output /data/day --check"),
+    example=("reference-day", "reference-day campaign/REFDAY --samples 0 --output /data/day --check"),
     output="results/NAME-reference-day",
     pdf=True,
     check="a requirement is not met, or undecided",
@@ -48,7 +58,8 @@ def reference_day(campaign: Campaign, **options: Any) -> Outcome:
     """Simulate the reference day of CAMPAIGN [default: campaign/REFDAY] in flight.
 
     Plans the antenna's trajectory from the orbit and the relay satellites of the campaign's mission file, flies it
-    through controller and plant, and judges pointing and disturbance torque in each section of the day.
+    through controller and plant, and judges pointing and disturbance torque in each section of the day. Units drawn
+    from the parameters' uncertainties fly the same day, and say how far the figures can be trusted.
     """
     from kbs_process.studies.reference_day.run import simulate_day
 

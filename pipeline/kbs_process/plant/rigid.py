@@ -198,14 +198,14 @@ def kinematics(rig: Rig, q: Array, qd: Array, qdd: Array) -> Links:
             v=parent.v + cross(parent.omega, pose.arm) + slide * rate,
             omega=parent.omega + turn * rate,
             alpha=parent.alpha + turn * (acceleration + cross(parent.omega, rate)),
-            accel=_accel_at(parent, pose.arm) + slide * (acceleration + 2.0 * cross(parent.omega, rate)),
+            accel=accel_at(parent, pose.arm) + slide * (acceleration + 2.0 * cross(parent.omega, rate)),
         )
         if rig.transducer.on == joint.name:
             place_transducer(joint.name)
     return links
 
 
-def _accel_at(link: LinkMotion, d: Array) -> Array:
+def accel_at(link: LinkMotion, d: Array) -> Array:
     """Acceleration of the link's point at `d` (n, 3) from its origin."""
     if not link.turns:
         return link.accel
@@ -231,7 +231,7 @@ def _reaction(rig: Rig, links: Links, beyond: frozenset[str], about: Array) -> t
             continue
         link = links[body.on]
         c = rotate(link.R, body.cog.value)
-        F = -float(body.mass) * _accel_at(link, c)
+        F = -float(body.mass) * accel_at(link, c)
         force += F
         moment += cross(link.r + c - about, F)
         if link.turns:

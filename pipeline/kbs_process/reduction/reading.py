@@ -14,7 +14,7 @@ from kbs_process.signals.records import Block, Loss, Run
 from kbs_process.stages.align.condense import CondenseSettings, condense
 
 # A recorder need not have these; everything else that the campaign names has to be there.
-OPTIONAL_STREAMS = frozenset({"field", "temperature", "pointing"})
+OPTIONAL_STREAMS = frozenset({"field", "temperature", "pointing", "accelerometer", "gyro"})
 # What to do where messages do not name a joint that they are expected to.
 _OTHERWISE = {
     "angle": "if encoders do not read every joint, list those that they do as `joints` of [topics.encoder] in "

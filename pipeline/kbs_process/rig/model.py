@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -215,6 +215,16 @@ class Spacecraft:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Inertial:
+    """An accelerometer or a gyro: three axes on a link."""
+
+    on: str  # link
+    attitude: Quantity  # (3,) rad, rotation vector that turns the link's axes into its own
+    noise: Quantity  # rms a sample
+    position: Quantity | None = None  # (3,) m in the link's axes, from its origin; of no matter to a gyro
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Loads:
     """All loads of a rig in one order: the six components of the wrench, then the effort of each joint, as read."""
 
@@ -239,6 +249,7 @@ class Rig:
     controller: Controller | None
     spacecraft: Spacecraft | None
     external: tuple[External, ...] = ()
+    instruments: dict[str, Inertial] = field(default_factory=dict)  # by the stream that they are recorded in
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -281,8 +292,11 @@ class Rig:
         return {body.inertia.name: body.inertia.value for body in self.bodies}
 
     def quantities(self) -> dict[str, Quantity]:
-        """Return every quantity of the rig by its dotted name; a transducer that is not there has none."""
-        absent = () if self.transducer.channels else ("transducer",)
+        """Return every quantity of the article and what carries it by its dotted name, the instruments' not.
+
+        A transducer that is not there has none.
+        """
+        absent = ("instruments", *(() if self.transducer.channels else ("transducer",)))
         parts = tuple(getattr(self, entry.name) for entry in fields(self) if entry.name not in absent)
         return {quantity.name: quantity for quantity in _walk(parts)}
 

@@ -195,6 +195,8 @@ class Run:
     losses: tuple[Loss, ...] = ()
     clocks: dict[str, Clock] = dataclasses.field(default_factory=dict)  # by stream
     pointing: Signal | None = None  # angle of each joint by an external instrument, rad
+    accelerometer: Signal | None = None  # (n, 3) m/s^2, along its own axes, gravity taken off
+    gyro: Signal | None = None  # (n, 3) rad/s
     effort: Signal | None = None  # of each joint that has it measured, in the unit in which it is recorded
     stretches: tuple[Stretch, ...] = ()  # that were bridged
     gaps: Array = dataclasses.field(

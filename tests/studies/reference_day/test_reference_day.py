@@ -53,7 +53,9 @@ def minute(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
 
 
 def test_a_day_is_planned_flown_judged_and_reported_the_same_twice(minute: Campaign, tmp_path: Path) -> None:
-    outcomes = [simulate_day(minute, tmp_path / name, progress=SilentProgress(), pdf=False) for name in "ab"]
+    outcomes = [
+        simulate_day(minute, tmp_path / name, samples=0, seed=0, progress=SilentProgress(), pdf=False) for name in "ab"
+    ]
     assert (tmp_path / "a" / "results.json").read_bytes() == (tmp_path / "b" / "results.json").read_bytes()
     page = outcomes[0].report.read_bytes()
     assert page == outcomes[1].report.read_bytes()
@@ -110,7 +112,7 @@ def test_a_section_without_its_event_is_refused(tmp_path: Path) -> None:
     section = '[[section]]\nname = "1"\nuntil = "loss"\nnear_s = 50\n'
     campaign = short_campaign(tmp_path / "SHORT", 60.0, section)
     with pytest.raises(ConfigError, match="section 1 ends with 'loss'"):
-        simulate_day(campaign, tmp_path / "out", progress=SilentProgress(), pdf=False)
+        simulate_day(campaign, tmp_path / "out", samples=0, seed=0, progress=SilentProgress(), pdf=False)
     assert not (tmp_path / "out").exists()
 
 

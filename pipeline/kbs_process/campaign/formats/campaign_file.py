@@ -109,6 +109,8 @@ class TopicsTable(Table):
     field: Topic | None = Field(None, description="position of each motor's field, motor rad")
     temperature: Topic | None = Field(None, description="transducer, degC")
     pointing: Topic | None = Field(None, description="angle of each joint by an external instrument, rad")
+    accelerometer: Topic | None = Field(None, description="on a link that parameter files name, m/s^2")
+    gyro: Topic | None = Field(None, description="on a link that parameter files name, rad/s")
 
 
 class ParametersTable(Table):
@@ -125,6 +127,10 @@ class MissionTable(Table):
     file: Text = Field(
         description="orbit, relay satellites and limits, relative to the campaign's folder; with it, a campaign may "
         "have no recordings"
+    )
+    mast: Text | None = Field(
+        None,
+        description="modes of the unit on its mast, a modal file, relative to the campaign's folder; left out: rigid",
     )
 
 

@@ -159,6 +159,27 @@ class ExternalTable(SpreadTable):
     parameters: dict[str, QuantityTable] = Field({}, description="what the effect asks for, by name")
 
 
+class InertialTable(SpreadTable):
+    """Where an instrument of three axes is, and how it is turned."""
+
+    on: str = Field(description='link that carries it: "lab", "T" or a joint')
+    attitude: Angles = Field(description="rotation vector that turns the link's axes into the instrument's")
+    noise: QuantityTable = Field(description="rms of a sample")
+
+
+class GyroTable(InertialTable):
+    """A gyro: reads the link's rate in its own axes."""
+
+    noise: Annotated[QuantityTable, Kind("rad/s", low=0.0)] = Field(description="rms of a sample")
+
+
+class AccelerometerTable(InertialTable):
+    """An accelerometer: reads its acceleration less gravity's in its own axes, g upwards at rest."""
+
+    position: Lengths = Field(description="from the link's origin, in the link's axes")
+    noise: Annotated[QuantityTable, Kind("m/s^2", low=0.0)] = Field(description="rms of a sample")
+
+
 class ParameterFile(SpreadTable):
     """A campaign may spread these tables over several files. Together they give all that is not optional."""
 
@@ -168,6 +189,8 @@ class ParameterFile(SpreadTable):
     transducer: TransducerTable | None = None
     controller: ControllerTable | None = None
     spacecraft: SpacecraftTable | None = None
+    accelerometer: AccelerometerTable | None = None
+    gyro: GyroTable | None = None
     body: dict[LinkName, BodyTable] = Field({})
     joint: Annotated[dict[LinkName, JointTable], Field(min_length=1)]
     external: dict[LinkName, ExternalTable] = Field(

@@ -23,7 +23,7 @@ ECSS-E-HB-32-26A, Spacecraft mechanical loads analysis handbook (2013).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,17 +61,30 @@ class ModalModel:
         squared: Array = self.participation**2
         return squared
 
+    def compliance(self, f: Array) -> npt.NDArray[np.complex128]:
+        """Motion of the interface (n, 6, 6), m and rad, for a wrench on a rigid base, at f (n,) Hz: see `transfer`."""
+        answer = self._answer(f)
+        moved: npt.NDArray[np.complex128] = np.einsum("ik,nk,jk->nij", self.shape, answer, self.shape)
+        return moved
+
+    def _answer(self, f: Array) -> npt.NDArray[np.complex128]:
+        """Motion (n, m) of each mode for a unit load on it."""
+        w, wk = 2.0 * np.pi * np.asarray(f, dtype=float)[:, None], 2.0 * np.pi * self.frequency
+        return np.asarray(1.0 / (wk**2 - w**2 + 2j * self.damping * wk * w), dtype=np.complex128)
+
     def transfer(self, f: Array) -> npt.NDArray[np.complex128]:
         """H(f), (n, 6, 6): wrench on the transducer for one on a rigid base, at f (n,) Hz.
 
         H = I + sum_k (w^2 P_k + G_k) phi_k^T / (w_k^2 - w^2 + 2 i zeta_k w_k w).
         """
-        w, wk = 2.0 * np.pi * np.asarray(f, dtype=float)[:, None], 2.0 * np.pi * self.frequency
-        answer = 1.0 / (wk**2 - w**2 + 2j * self.damping * wk * w)
+        w, answer = 2.0 * np.pi * np.asarray(f, dtype=float)[:, None], self._answer(f)
         H: npt.NDArray[np.complex128] = np.einsum("ik,nk,jk->nij", self.participation, answer * w**2, self.shape)
         H += np.einsum("ik,nk,jk->nij", self.gravity, answer, self.shape)
         H += np.eye(6)
         return H
+
+
+Transfer = Callable[[ModalModel, Array], npt.NDArray[np.complex128]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,8 +187,10 @@ def tracked(models: Sequence[ModalModel]) -> tuple[ModalModel, ...]:
     return tuple(followed)
 
 
-def respond(load: Array, dt: float, angle: Array, table: ModalTable) -> Array:
-    """Return the wrench (n, 6) on the transducer for `load` (n, 6) on a rigid base, sampled every dt s.
+def respond(load: Array, dt: float, angle: Array, table: ModalTable, transfer: Transfer = ModalModel.transfer) -> Array:
+    """Return the wrench (n, 6) on the transducer, or another `transfer`, for `load` (n, 6) on a rigid base.
+
+    Samples come every dt s.
 
     `angle` (n,) rad is that of the table's joint. Every stretch of the load, under a Hann window that overlaps its
     neighbours' by a half, is answered by the structure as it then stands, and rings on beyond its end. Exact for
@@ -195,7 +210,7 @@ def respond(load: Array, dt: float, angle: Array, table: ModalTable) -> Array:
         piece = np.zeros((2 * hop, 6))
         piece[inside.start - start : inside.stop - start] = held[inside]
         middle = min(max(start + hop - lead, 0), len(angle) - 1)
-        H = table.at(float(angle[middle])).transfer(f)
+        H = transfer(table.at(float(angle[middle])), f)
         spectrum = np.einsum("nij,nj->ni", H, rfft(piece * window[:, None], length, axis=0))
         rung = irfft(spectrum, length, axis=0)
         skipped = max(0, -start)

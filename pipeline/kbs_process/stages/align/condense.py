@@ -36,7 +36,8 @@ Progress = Callable[[str, int], None]  # stream, samples just taken
 
 SLOWEST = 100.0  # times that a stream may be slower than the working rate
 # Brought to the working rate; the first one present is the reference.
-SAMPLED = ("wrench", "effort", "angle", "rate", "pointing")
+SAMPLED = ("wrench", "effort", "angle", "rate", "pointing", "accelerometer", "gyro")
+BESIDE = ("pointing", "accelerometer", "gyro")  # of these, what nothing that is judged leans on
 LOADS = ("wrench", "effort")  # the first one present has spectrum and envelope
 TURNING = ("angle", "pointing")  # of joints, where they turn
 SLOW = ("command", "field", "temperature")  # kept sample by sample: one a control cycle, or slower
@@ -47,7 +48,7 @@ _NO_NUMBERS = {
     "effort": f"leave the effort of a joint whose channel is dead out of the parameter files, {_OUT}",
     "angle": f"list the joints that are read as `joints` of [topics.encoder] in campaign.toml, {_OUT}",
     "rate": f"record the rates again, or leave topics.rate out where angles are recorded, {_OUT}",
-    "pointing": f"leave topics.pointing out of campaign.toml, {_OUT}",
+    **{key: f"leave topics.{key} out of campaign.toml, {_OUT}" for key in BESIDE},
     "command": f"record the commands, {_OUT}",
 }
 DOUBT = 1e-3  # largest weight of invented samples in a valid one
@@ -151,14 +152,16 @@ def condense(
         losses=(*_losses(present, clocks), *unread),
         clocks=clocks,
         pointing=signals.get("pointing"),
+        accelerometer=signals.get("accelerometer"),
+        gyro=signals.get("gyro"),
         effort=signals.get("effort"),
         stretches=tuple(
             Stretch(kind, clocks[key].offset_s + (1.0 + clocks[key].skew) * own, length, likely and key in LOADS)
             for key in kept
             for kind, own, length, likely in sampled[key].line.stretches()
-            if key in LOADS or (kind == SPIKE and key != "pointing")
+            if key in LOADS or (kind == SPIKE and key not in BESIDE)
         ),
-        gaps=np.concatenate([_on_axis(sampled[key].gaps(), clocks[key]) for key in kept if key != "pointing"]),
+        gaps=np.concatenate([_on_axis(sampled[key].gaps(), clocks[key]) for key in kept if key not in BESIDE]),
         reach=max(one.design.leaning(DOUBT) for one in kept.values()),
     )
 
@@ -291,6 +294,8 @@ def _meaning(key: str, columns: tuple[str, ...], units: tuple[str, ...] | None) 
     """Units and frame of a stream."""
     if key == "wrench":
         return tuple(WRENCH_UNITS[WRENCH_CHANNELS.index(channel)] for channel in columns), "T"
+    if key in ("accelerometer", "gyro"):
+        return units or (), key
     return units or ("rad/s" if key == "rate" else "rad",) * len(columns), "joint"
 
 

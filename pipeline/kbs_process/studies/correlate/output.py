@@ -14,14 +14,18 @@ from kbs_process.results.tables import TableWriter, write_table
 from kbs_process.signals.grid import crop
 from kbs_process.signals.records import WRENCH_CHANNELS, Signal
 from kbs_process.stages.repeats import commanded
-from kbs_process.studies.correlate import orders
+from kbs_process.studies.correlate import instruments, orders
 from kbs_process.studies.correlate.transducer import Study
 
 _PIECE = 2**13  # samples that are written at a time
 
 
 def write_tables(
-    folder: Path, analyses: Sequence[Analysis], on_transducer: Study | None, by_angle: Sequence[orders.Study]
+    folder: Path,
+    analyses: Sequence[Analysis],
+    on_transducer: Study | None,
+    by_angle: Sequence[orders.Study],
+    by_instrument: Sequence[instruments.Beside],
 ) -> None:
     """Write the tables of every stage, and the processed signals as MCAP."""
     for analysis in analyses:
@@ -34,6 +38,9 @@ def write_tables(
         for kind, (columns, units) in orders.tables_of(one).items():
             path = folder / "tables" / "orders" / f"{name}.{one.findings.joint}{kind}.parquet"
             write_table(path, columns, units, frame="T", recording=name)
+    for beside in by_instrument:
+        path = folder / "tables" / "instruments" / f"{beside.recording}.{beside.stream}.parquet"
+        write_table(path, beside.columns(), instruments.units(beside), frame=beside.stream, recording=beside.recording)
 
 
 def _curves(folder: Path, found: Study) -> None:

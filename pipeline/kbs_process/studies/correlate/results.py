@@ -336,6 +336,22 @@ class OrdersIn(Record, frozen=True, kw_only=True):
     above: dict[str, float] = msgspec.field(default_factory=dict)  # known orders beyond `highest`
 
 
+class InstrumentChannel(Record, frozen=True, kw_only=True):
+    """What one axis of an accelerometer or gyro reads in a recording, beside the motion; rms about the means."""
+
+    recording: str
+    instrument: str
+    channel: str  # axis
+    unit: str
+    zero: float  # mean of measured less encoders
+    measured: float
+    encoders: float  # by their motion
+    encoders_left: float  # measured less that
+    predicted: float | None
+    predicted_left: float | None
+    noise: float  # of measured, as stated
+
+
 class Results(ResultsFile, frozen=True, kw_only=True):
     """results.json."""
 
@@ -359,6 +375,7 @@ class Results(ResultsFile, frozen=True, kw_only=True):
     budget: tuple[Budget, ...] = ()
     six_channels: tuple[SixChannels, ...] = ()
     pointing: tuple[RecordedPointing, ...] = ()
+    instruments: tuple[InstrumentChannel, ...] = ()
     methods: str = ""  # paragraphs, separated by empty lines
     parameters: tuple[Constant, ...] = ()
     notes: tuple[str, ...] = ()  # assumptions to be said aloud: how torques were moved to S, for one

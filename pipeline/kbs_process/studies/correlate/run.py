@@ -26,7 +26,7 @@ from kbs_process.stages import decouple
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity.ladder import ladder
 from kbs_process.stages.gravity.model import GravityModel
-from kbs_process.studies.correlate import orders
+from kbs_process.studies.correlate import instruments, orders
 from kbs_process.studies.correlate.earlier_diagnosis import keep_diagnosis
 from kbs_process.studies.correlate.notices import has_spikes, spikes, unclear
 from kbs_process.studies.correlate.output import write_tables
@@ -63,13 +63,20 @@ def process(
             on_transducer = study(campaign, analyses, model.rig, task.update)
         with progress.task("Following the orders of the joints"):
             by_angle = list(orders.study(campaign, analyses))
+        by_instrument = list(instruments.study(campaign, analyses, model.rig))
         with progress.task("Writing the report"):
-            write_tables(folder, analyses, on_transducer, by_angle)
+            write_tables(folder, analyses, on_transducer, by_angle, by_instrument)
             keep_diagnosis(campaign, target, folder)
             from kbs_process.studies.correlate.report import DOCUMENT  # draws: takes its time to import
 
             turned = tuple(one.findings for one in by_angle)
-            found = msgspec.structs.replace(found, transducer=on_transducer and on_transducer.findings, orders=turned)
+            found = msgspec.structs.replace(
+                found,
+                transducer=on_transducer and on_transducer.findings,
+                orders=turned,
+                instruments=tuple(row for one in by_instrument for row in one.findings()),
+                warnings=(*found.warnings, *instruments.notices(by_instrument)),
+            )
             serious = sum(notice.severity != "info" for notice in found.warnings)
             more = [f"Model: {found.model.status}. {found.model.sentence}"] if found.model else []
             more += [f"{count(serious, 'warning')}: see the top of the report"] if serious else []

@@ -79,7 +79,7 @@ def _torque(compared: Compared) -> Iterator[str]:
     quiet, bound = min((section.torques[-1].value, one.torque_Nm) for section, one in compared)
     yield _SAYS("torque", inside=inside, whole=whole, published=published, quiet=quiet, bound=bound)
     if inside.torques[0].value < 0.5 * published:
-        yield _SAYS("internal")
+        yield _SAYS("internal", mast=inside.mast)
 
 
 def _loop(rig: Rig, compared: Compared) -> Iterator[str]:

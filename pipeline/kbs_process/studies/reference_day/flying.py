@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kbs_process.campaign.config import Campaign
+from kbs_process.errors import ConfigError
 from kbs_process.mission.planner import Plan
 from kbs_process.plant.predict import Schedule, predict
-from kbs_process.rig.model import Rig
+from kbs_process.rig.model import Amplifier, Quantity, Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Block, Signal
+from kbs_process.signals.spatial import transform_wrench
 from kbs_process.stages.align.condense import CondenseSettings, condense
 from kbs_process.stages.gravity.equation import encoder_offsets
+from kbs_process.stages.to_cog import pose
 
-WRENCH_RATE = 100.0  # Hz: the low-pass before the samples lets nothing alias into the bands
+TORQUES = WRENCH_CHANNELS[3:]
+WRENCH_RATE = 200.0  # Hz
+# Nothing in flight has an amplifier: this one lets nothing alias, and ends the widest band. The rotors' modes near
+# 200 Hz are down to 0.4 % there.
+CORNER = 50.0  # Hz
+_LOW_PASS = Amplifier(4, Quantity("transducer.amplifier.corner", np.array(CORNER), "Hz", np.zeros(()), "sampling"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,7 +31,8 @@ class Flown:
     """What the plant did on the planned commands, on the day's own time axis."""
 
     angle: Signal  # true joint angles, rad
-    wrench: Signal  # on the spacecraft at the interface, in T
+    wrench: Signal  # on the spacecraft at the interface, in T, at the working rate
+    torque: Signal  # at the spacecraft's centre of mass, up to `CORNER`
 
 
 def commands(planned: Plan, rig: Rig) -> Schedule:
@@ -44,8 +53,16 @@ def commands(planned: Plan, rig: Rig) -> Schedule:
 
 def fly(campaign: Campaign, planned: Plan, duration: float, update: Callable[[float], None] | None = None) -> Flown:
     """Simulate the day in one piece, a block at a time; only the working rate is kept."""
-    rig, rate = campaign.rig, campaign.bands.working_rate
+    rate = campaign.bands.working_rate
+    rig = replace(campaign.rig, transducer=replace(campaign.rig.transducer, amplifier=_LOW_PASS))
+    if rig.spacecraft is None:
+        raise ConfigError(
+            "nothing says where the spacecraft's centre of mass is",
+            where=campaign.name,
+            remedy="describe [spacecraft] in a parameter file",
+        )
     angles: list[Array] = []
+    torques: list[Array] = []
     blocks = predict(
         rig,
         campaign.effects,
@@ -58,23 +75,32 @@ def fly(campaign: Campaign, planned: Plan, duration: float, update: Callable[[fl
     )
     run = condense(
         campaign.name,
-        _aside(blocks, angles),
+        _aside(blocks, pose(rig.spacecraft), angles, torques),
         {"wrench": WRENCH_CHANNELS},
         CondenseSettings(working_rate_Hz=rate),
         keep_spikes=True,
     )
     assert run.wrench is not None  # the plant gives one
     q = np.concatenate(angles) - encoder_offsets(rig)
-    names = rig.joint_names
-    valid = np.ones(len(q), dtype=np.bool_)
-    angle = Signal(0.0, 1.0 / rate, q, names, ("rad",) * len(names), "joint", valid, ("true angle of the plant",))
-    return Flown(angle, run.wrench)
+    at = (f"at the spacecraft's centre of mass, below {CORNER:g} Hz",)
+    return Flown(
+        angle=_signal(q, 1.0 / rate, rig.joint_names, "rad", "joint", ("true angle of the plant",)),
+        wrench=run.wrench,
+        torque=_signal(np.concatenate(torques), 1.0 / WRENCH_RATE, TORQUES, "N m", "S", at),
+    )
 
 
-def _aside(blocks: Iterator[tuple[str, Block]], angles: list[Array]) -> Iterator[tuple[str, Block]]:
-    """Pass the wrench on, and put the angles aside: they are instants, not to be filtered."""
+def _signal(x: Array, dt: float, channels: tuple[str, ...], unit: str, frame: str, history: tuple[str, ...]) -> Signal:
+    return Signal(0.0, dt, x, channels, (unit,) * len(channels), frame, np.ones(len(x), dtype=np.bool_), history)
+
+
+def _aside(
+    blocks: Iterator[tuple[str, Block]], at: tuple[Array, Array], angles: list[Array], torques: list[Array]
+) -> Iterator[tuple[str, Block]]:
+    """Pass the wrench on, and put aside the angles, which are instants, not to be filtered, and the torques."""
     for key, block in blocks:
         if key == "angle":
             angles.append(block.values)
         elif key == "wrench":
+            torques.append(transform_wrench(block.values, *at)[:, 3:].copy())
             yield key, block

@@ -7,7 +7,7 @@ from kbs_process.report.document import Document
 from kbs_process.report.panel import Head, Panel
 from kbs_process.report.tables import Tables
 from kbs_process.studies.reference_day.results import ReferenceDayResults
-from kbs_process.studies.reference_day.sections import compliance, errors, sections, torque, trajectory
+from kbs_process.studies.reference_day.sections import compliance, errors, mast, sections, torque, trajectory
 
 
 def head(results: ReferenceDayResults) -> Head:
@@ -26,6 +26,7 @@ DOCUMENT = Document(
     record=ReferenceDayResults,
     head=head,
     panels=(
-        compliance.panel, sections.panel, trajectory.panel, errors.panel, torque.panel, _constants, provenance.section,
+        compliance.panel, sections.panel, trajectory.panel, errors.panel, torque.panel, mast.panel,
+        _constants, provenance.section,
     ),
 )  # fmt: skip

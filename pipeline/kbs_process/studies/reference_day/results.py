@@ -19,6 +19,30 @@ class PublishedSection(Record, frozen=True, kw_only=True):
     end_s: float
 
 
+class Spread(Record, frozen=True, kw_only=True):
+    """What units that the parameters' uncertainties allow differ by in a figure, in its unit."""
+
+    mean: float
+    sigma: float
+    least: float
+    greatest: float
+
+
+class Without(Record, frozen=True, kw_only=True):
+    """The rms of a torque as it is without something, in its unit."""
+
+    name: str
+    value: float
+
+
+class Cause(Record, frozen=True, kw_only=True):
+    """What makes a torque."""
+
+    frequency_Hz: float  # the strongest about its moment
+    mode_Hz: float | None  # the nearest mode of gears and rotors, where it is near
+    without: tuple[Without, ...]  # of its section, least first
+
+
 class Torque(Record, frozen=True, kw_only=True):
     """Greatest disturbance torque at the spacecraft's centre of mass, over all axes."""
 
@@ -27,6 +51,25 @@ class Torque(Record, frozen=True, kw_only=True):
     value: float  # N m
     axis: str
     time_s: float
+    rms: float = 0.0  # of the resultant over the section
+    units: Spread | None = None
+    cause: Cause | None = None  # of what is above the other bands
+
+
+class MastIn(Record, frozen=True, kw_only=True):
+    """What a mast changes in a section."""
+
+    rigid: tuple[float, ...]  # N m: the torques below the widest, as they are on a rigid interface
+    cross_elevation: float  # rad: greatest turn of the boresight by its head
+    elevation: float
+
+
+class Mast(Record, frozen=True, kw_only=True):
+    """The modes of the unit on its mast; each range is over the poses."""
+
+    source: str
+    frequency_Hz: tuple[tuple[float, float], ...]  # least and greatest of each mode
+    damping: tuple[tuple[float, float], ...]
 
 
 class Section(Record, frozen=True, kw_only=True):
@@ -41,7 +84,15 @@ class Section(Record, frozen=True, kw_only=True):
     azimuth: PointingEstimate
     elevation: PointingEstimate
     torques: tuple[Torque, ...]  # narrowest band first
+    azimuth_units: Spread | None = None  # of its 95 %
+    elevation_units: Spread | None = None
     published: PublishedSection | None = None
+    mast: MastIn | None = None
+
+    @property
+    def axes(self) -> tuple[PointingEstimate, PointingEstimate]:
+        """Azimuth and elevation."""
+        return self.azimuth, self.elevation
 
 
 class Judged(Record, frozen=True, kw_only=True):
@@ -94,6 +145,10 @@ class ReferenceDayResults(ResultsFile, frozen=True, kw_only=True):
     sections: tuple[Section, ...]
     requirements: tuple[Judged, ...]
     boresight: tuple[PointingEstimate, ...]  # over the whole day
+    mast: Mast | None = None  # None: rigid
+    samples: int = 0  # units beside the nominal one
+    failed: int = 0  # that could not be simulated
+    seed: int = 0
     discussion: tuple[str, ...] = ()
     parameters: tuple[Constant, ...] = ()
     notes: tuple[str, ...] = ()

@@ -12,27 +12,46 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.campaign.mission import Day, load_day
 from kbs_process.mission import orbit
 from kbs_process.mission.planner import Plan, plan
+from kbs_process.plant.linear.modal import ModalTable
+from kbs_process.plant.sampling import values
 from kbs_process.progress import Progress
 from kbs_process.report.build import publish
 from kbs_process.report.prose import Prose
+from kbs_process.report.text import count
 from kbs_process.results import provenance
 from kbs_process.results.outcome import Outcome
-from kbs_process.results.records import Conclusion, Constant
+from kbs_process.results.records import Conclusion, Constant, Notice
 from kbs_process.results.store import writing
+from kbs_process.rig.model import substitute
 from kbs_process.stages.to_cog import ASSUMPTION
 from kbs_process.stages.verdict import COVERAGE
+from kbs_process.studies.reference_day.causes import with_causes, without_each
 from kbs_process.studies.reference_day.day import Assessed, assess
 from kbs_process.studies.reference_day.discussion import discussion
 from kbs_process.studies.reference_day.files import write_tables
 from kbs_process.studies.reference_day.flying import fly
 from kbs_process.studies.reference_day.report import DOCUMENT
-from kbs_process.studies.reference_day.results import Geometry, Judged, Phase, ReferenceDayResults
+from kbs_process.studies.reference_day.results import Geometry, Judged, Mast, Phase, ReferenceDayResults
+from kbs_process.studies.reference_day.units import Units, draw_units, fly_days, units_of, with_spread
+from kbs_process.studies.reference_day.verdicts import judged
 
 _SAYS = Prose("kbs_process.studies.reference_day", "notes")
 
 
-def simulate_day(campaign: Campaign, target: Path, *, progress: Progress, pdf: bool | None = None) -> Outcome:
-    """Plan, fly and judge the campaign's reference day; put the results in `target`, in one step."""
+def simulate_day(
+    campaign: Campaign,
+    target: Path,
+    *,
+    samples: int,
+    seed: int,
+    progress: Progress,
+    pdf: bool | None = None,
+    processes: int | None = None,
+) -> Outcome:
+    """Plan, fly and judge the campaign's reference day; put the results in `target`, in one step.
+
+    `samples` units that the parameters' uncertainties allow fly the same day; with them, rigs that lack one effect.
+    """
     campaign = replace(campaign, recordings=())  # a day is planned: recordings of a test need not be there
     day = load_day(campaign)
     with writing(target) as folder:
@@ -40,20 +59,35 @@ def simulate_day(campaign: Campaign, target: Path, *, progress: Progress, pdf: b
             planned = plan(day.mission, day.lead)
         with progress.task(f"Flying {day.mission.duration:.0f} s") as task:
             flown = fly(campaign, planned, day.mission.duration, task.update)
+            nominal = assess(campaign, day, planned, flown)
+        numbers, drawn = draw_units(campaign, samples, seed)
+        rigs = [substitute(campaign.rig, values(campaign.rig, numbers, row)) for row in drawn]
+        changed = without_each(campaign) if rigs else {}
+        what = f"Flying {len(rigs)} units, and {len(changed)} without an effect" if rigs else "Flying no other units"
+        with progress.task(what) as task:
+            reached = fly_days(campaign, day, planned, [*rigs, *changed.values()], task.update, processes)
+        units = units_of(numbers, drawn, reached[: len(rigs)])
         with progress.task("Judging pointing and torque"):
-            assessed = assess(campaign, day, planned, flown.angle, flown.wrench)
+            without = dict(zip(changed, reached[len(rigs) :], strict=True))
+            assessed = with_spread(with_causes(campaign, planned, flown.torque, nominal, without), units)
         with progress.task("Writing the report"):
-            write_tables(folder, planned, assessed)
-            return publish(folder, target, _results(campaign, day, planned, assessed), DOCUMENT, pdf)
+            write_tables(folder, planned, assessed, units)
+            results = _results(campaign, day, planned, assessed, units, seed)
+            return publish(folder, target, results, DOCUMENT, pdf)
 
 
-def _results(campaign: Campaign, day: Day, planned: Plan, found: Assessed) -> ReferenceDayResults:
+def _results(
+    campaign: Campaign, day: Day, planned: Plan, found: Assessed, units: Units, seed: int
+) -> ReferenceDayResults:
+    requirements = judged(campaign, day, found, units)
+    samples = len(units.reached)
+    options = f"--samples {samples + units.failed} --seed {seed}"
     return ReferenceDayResults(
         name=campaign.name,
         title=campaign.title,
         article=campaign.article,
-        verdict=_conclusion(found.requirements),
-        provenance=provenance.made("reference-day", campaign.folder, (*campaign.files, day.path)),
+        verdict=_conclusion(requirements),
+        provenance=provenance.made("reference-day", campaign.folder, (*campaign.files, day.path), options),
         geometry=_geometry(day, planned),
         phases=tuple(
             Phase(
@@ -65,12 +99,35 @@ def _results(campaign: Campaign, day: Day, planned: Plan, found: Assessed) -> Re
             for phase in planned.phases
         ),
         sections=found.sections,
-        requirements=found.requirements,
+        requirements=requirements,
         boresight=found.whole,
+        mast=None if day.mast is None else _mast(day.mast),
+        samples=samples,
+        failed=units.failed,
+        seed=seed,
+        warnings=tuple(_warnings(units)),
         discussion=tuple(discussion(campaign.rig, found.sections)),
         parameters=(*_constants(day), *provenance.constants(campaign.rig)),
-        notes=(*map(_SAYS, ("orbit", "error", "uncertainty", "peaks")), ASSUMPTION),
+        notes=(_SAYS("orbit", mast=day.mast), _SAYS("error"), _SAYS("uncertainty", samples=samples), ASSUMPTION),
     )
+
+
+def _mast(table: ModalTable) -> Mast:
+    def ranges(name: str) -> tuple[tuple[float, float], ...]:
+        over = np.stack([getattr(model, name) for model in table.models])
+        return tuple((float(low), float(high)) for low, high in zip(over.min(axis=0), over.max(axis=0), strict=True))
+
+    return Mast(source=table.source, frequency_Hz=ranges("frequency"), damping=ranges("damping"))
+
+
+def _warnings(units: Units) -> Iterator[Notice]:
+    if units.failed:
+        yield Notice(
+            severity="warning",
+            what=f"{count(units.failed, 'unit')} of {units.failed + len(units.reached)} could not be simulated: "
+            "what units differ by leaves them out",
+            remedy="check the sigma of the drives' parameters",
+        )
 
 
 def _conclusion(judged: Sequence[Judged]) -> Conclusion:

@@ -12,8 +12,9 @@ from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import MISSING, measure, number
 from kbs_process.results.pointing import PointingEstimate
-from kbs_process.studies.reference_day.results import ReferenceDayResults, Section
+from kbs_process.studies.reference_day.results import ReferenceDayResults, Section, Spread
 
+_MDEG = 1e3 * float(np.degrees(1.0))
 _SAYS = Prose("kbs_process.studies.reference_day", "sections")
 
 
@@ -25,6 +26,8 @@ def panel(results: ReferenceDayResults, tables: Tables) -> Panel:
         blocks.append(
             Figure("95 % of the pointing error, simulated and published", (figure,), _SAYS.caption("compared"))
         )
+    if results.samples:
+        blocks.append(_units(results))
     if results.discussion:
         blocks.append(Text("Where they differ, and why:", results.discussion))
     blocks.append(_statistics(results))
@@ -63,8 +66,32 @@ def _row(section: Section) -> tuple[str, ...]:
     )
 
 
+def _units(results: ReferenceDayResults) -> Grid:
+    """What units differ by, in every figure of the sections."""
+    bands = tuple(f"Torque {torque.label} / N\u00a0m" for torque in results.sections[0].torques)
+    rows = tuple(
+        (
+            section.name,
+            _among(section.azimuth_units, _MDEG),
+            _among(section.elevation_units, _MDEG),
+            *(_among(torque.units, 1.0) for torque in section.torques),
+        )
+        for section in results.sections
+    )
+    note = _SAYS("units", samples=results.samples, seed=results.seed)
+    head = ("Section", "az 95 % / mdeg", "el 95 % / mdeg", *bands)
+    return Grid("What units differ by", head, rows, "krr" + "r" * len(bands), note)
+
+
+def _among(one: Spread | None, scale: float) -> str:
+    if one is None:
+        return MISSING
+    least, greatest = (number(scale * x, 3) for x in (one.least, one.greatest))
+    return f"{measure(scale * one.mean, scale * one.sigma)} ({least} to {greatest})"
+
+
 def _mdeg(value: float, sigma: float) -> str:
-    return measure(1e3 * float(np.degrees(value)), 1e3 * float(np.degrees(sigma)))
+    return measure(_MDEG * value, _MDEG * sigma)
 
 
 def _statistics(results: ReferenceDayResults) -> Grid:
@@ -86,8 +113,13 @@ def _line(where: str, name: str, one: PointingEstimate) -> tuple[str, ...]:
         _mdeg(one.bias, one.bias_sigma),
         _mdeg(one.random, one.random_sigma),
         _mdeg(one.percentile, one.percentile_sigma),
-        number(1e3 * float(np.degrees(one.greatest))),
+        number(_MDEG * one.greatest),
     )
+
+
+def _sigma(own: PointingEstimate, among: Spread | None) -> float:
+    """One standard deviation, mdeg, of 95 %: by the length of the section, and by what units differ by."""
+    return _MDEG * float(np.hypot(own.percentile_sigma, 0.0 if among is None else among.sigma))
 
 
 def _against_published(sections: Sequence[Section]) -> Picture:
@@ -96,8 +128,8 @@ def _against_published(sections: Sequence[Section]) -> Picture:
     with draw.style():
         figure, axes = draw.row(2.3, 2, share_y=True)
         for axis, which in zip(axes, ("azimuth", "elevation"), strict=True):
-            ours = [1e3 * np.degrees(getattr(section, which).percentile) for section in sections]
-            sigma = [1e3 * np.degrees(getattr(section, which).percentile_sigma) for section in sections]
+            ours = [_MDEG * getattr(section, which).percentile for section in sections]
+            sigma = [_sigma(getattr(section, which), getattr(section, f"{which}_units")) for section in sections]
             theirs = [getattr(section.published, f"{which}_mdeg", np.nan) for section in sections]
             axis.bar(place - 0.2, ours, 0.38, yerr=2.0 * np.array(sigma), color=draw.MEASURED, label="simulated, ± 2 σ",
                      error_kw={"elinewidth": 0.8, "capsize": 1.5, "ecolor": draw.INK})  # fmt: skip
