@@ -111,3 +111,7 @@ class Budget(Record, frozen=True, kw_only=True):
     contributions: tuple[BudgetItem, ...]
     total: float
     recording: str | None = None  # None: of all recordings alike
+
+    def part(self, source: str) -> float:
+        """Return what one source contributes, one sigma; zero where it does not."""
+        return next((item.sigma for item in self.contributions if item.source == source), 0.0)

@@ -27,7 +27,7 @@ from kbs_process.stages.gravity.quality import feasibility
 from kbs_process.stages.to_cog import ASSUMPTION
 from kbs_process.stages.verdict import SEVERITY
 from kbs_process.studies.correlate import results
-from kbs_process.studies.correlate.findings import band, merits, repeatabilities, resonances, statements
+from kbs_process.studies.correlate.findings import band, merits, repeatabilities, resonances, rig_forces, statements
 from kbs_process.studies.correlate.methods import methods
 from kbs_process.studies.correlate.notices import model_verdict, notices
 from kbs_process.studies.correlate.uncertainty import budgets, six_channels
@@ -86,6 +86,7 @@ def summarise(
         resonances=modes,
         budget=budget,
         six_channels=tuple(six_channels(campaign, runs, budget)),
+        rig_forces=tuple(rig_forces(campaign, runs)),
         pointing=tuple(recorded_pointing(analyses)),
         parameters=tuple(provenance.constants(campaign.rig)),
         notes=(ASSUMPTION,) if campaign.rig.spacecraft is not None else (),

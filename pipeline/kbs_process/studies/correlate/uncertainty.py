@@ -134,7 +134,7 @@ def _entries(
     forces = forces_in(campaign, analysis.entry)
     if unknown := list(errors(measured, rig, forces, analysis.motion.q)):
         in_motion = gravity_error.moving(analysis.motion)
-        entries.append(budget.from_shapes("rig", "what is not known of its cords", unknown, cut, in_motion))
+        entries.append(budget.from_shapes("rig", budget.CORDS, unknown, cut, in_motion))
     if repeat_noise is not None:
         entries.append(budget.repeatability(repeat_noise, sensor.sigma))
     return entries
