@@ -122,10 +122,9 @@ def conclusion(requirements: Sequence[Requirement], pointed: Sequence[JudgedPoin
     if worst.untested:
         unshown += " No sign and no axis was tested: the loads change too little for what the files leave open."
     axes = ", ".join(worst.axes)
-    least = f"{low:.4f}" if low > 0.0 else "0"
     sentence = (
         f"{worst.name}: {word}. {worst.statistic.capitalize()} {value:.4f} {worst.unit} "
-        f"({least} to {high:.4f} at 95 %) on {worst.channel} in {worst.recording}, "
+        f"({_span(low, high)} at 95 %) on {worst.channel} in {worst.recording}, "
         f"{worst.band_Hz[0] or 0:g} to {worst.band_Hz[1] or 0:g} Hz; limit {worst.limit:g} {worst.unit}"
         f"{'' if worst.lever_m is None else f', {worst.lever_m:.3g} m from the transducer'}."
         f"{beside}{unshown if worst.verdict == 'pass' else ''}"
@@ -143,7 +142,11 @@ def _other_way(worst: Requirement, way: Way) -> str:
         figure, ours, others = way.together, "the measured forces", "by all six channels at once"
     agree = "" if way.agree else " They disagree, so the worse counts."
     value, low, high = figure
-    return f" By {ours}; {others}, it is {value:.4f} ({low:.4f} to {high:.4f}).{agree}"
+    return f" By {ours}; {others}, it is {value:.4f} ({_span(low, high)}).{agree}"
+
+
+def _span(low: float, high: float) -> str:
+    return f"{f'{low:.4f}' if low > 0.0 else '0'} to {high:.4f}"
 
 
 def _word(one: Requirement | JudgedPointing) -> str:
