@@ -87,13 +87,13 @@ def _ways(entry: Requirement) -> Grid:
             way.channel,
             way.recording,
             *(f"{number(value)} ({number(low)} to {number(high)})" for value, low, high in (way.together, way.moved)),
-            "agree" if way.agree else Cell("disagree: the worse counts", "undecided"),
+            "yes" if way.agree else Cell("no: the worse counts", "undecided"),
         )
         for way in sorted(entry.ways, key=lambda way: way.channel)
         if (way.recording, way.channel) in deciding
     )
     ways = (f"All six channels at once / {unit(entry.unit)}", f"Moved by the measured forces / {unit(entry.unit)}")
-    head = ("Channel", "Recording", *ways, "The two")
+    head = ("Channel", "Recording", *ways, "Agreement")
     return Grid(f"{entry.name}: both ways to the spacecraft", head, rows, "kkrrl", _SAYS("ways_note"))
 
 
