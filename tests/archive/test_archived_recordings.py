@@ -15,6 +15,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from engine.archive import TRUTH_FOLDER, make
 from engine.campaigns import CAMPAIGNS, CAMPAIGNS_FOLDER
+from engine.hardware import Hardware
 from engine.mcap_file import write
 from engine.trajectories import TRAJECTORIES
 
@@ -37,6 +38,21 @@ def test_truth_is_the_hardware_drawn(name: str) -> None:
     assert set(truth["hardware"]) == set(hardware.values)
     for key, value in hardware.values.items():
         np.testing.assert_allclose(truth["hardware"][key], value, rtol=1e-14, err_msg=key)
+
+
+@pytest.mark.parametrize("name", ["EL089_ADC", "APM_1996"])
+def test_what_the_paper_asked_for_is_tried_on_the_article_of_1996(name: str) -> None:
+    ours, theirs = (CAMPAIGNS[each].hardware().values for each in (name, "EL089_1996"))
+    for key, value in theirs.items():
+        assert np.array_equal(ours[key], value) or (name, key.rpartition(".")[0]) == ("APM_1996", "body.antenna"), key
+
+
+def test_a_measured_inclination_is_that_of_the_article() -> None:
+    campaign = CAMPAIGNS["EL089_1996"]
+    files = ("parameters/aligned.toml", "parameters/bounds.toml")
+    stated, true = Hardware.from_campaign(campaign.folder, files=files), campaign.hardware()
+    off = np.abs(stated["transducer.tilt"] - true["transducer.tilt"])
+    assert np.all(off < 2.0 * stated.sigmas["transducer.tilt"])
 
 
 def test_archive_is_small() -> None:

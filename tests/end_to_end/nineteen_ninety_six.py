@@ -21,6 +21,7 @@ from kbs_process.stages import bandpass
 from kbs_process.stages.bandpass import Band
 
 NAME = "EL089_1996"
+IMPROVED = ("EL089_ADC", "DUMMY_1996", "APM_1996")  # as the paper asked for afterwards
 BAND = Band("lt1Hz", 0.02, 1.0)
 TORQUES = ("Tx", "Ty", "Tz")
 
@@ -43,6 +44,10 @@ def main() -> None:
         print("EL089P00_1, Tx below 1 Hz, rms / N m")
         for what, rms in encoders(campaign).items():
             print(f"  {what}: {rms:.5f}")
+        for name in (NAME, *IMPROVED):
+            print(name)
+            for line in improvable(processed(name, Path(root))):
+                print(f"  {line}")
 
 
 def ladder(campaign: Processed) -> dict[str, Mapping[str, float]]:
@@ -67,9 +72,25 @@ def noises(campaign: Processed) -> Iterator[tuple[str, str, float, float, float]
             )
 
 
+def improvable(campaign: Processed) -> Iterator[str]:
+    """What the paper's improvements change: the static torque, what gravity leaves, noise in the data, a CoG."""
+    gravity = campaign.results["gravity"]
+    sigmas = {one["name"]: one["sigma"] for one in gravity["parameters"]}
+    yield "CoG of the azimuth body, one sigma: " + ", ".join(
+        f"{sigmas[f'body.azimuth.cog[{k}]']:.5f} m" for k in (0, 1)
+    )
+    for one in gravity["channels"]:
+        if one["channel"] in TORQUES:
+            first = gravity["ladder"][0]["rms"][one["channel"]]
+            yield f"{one['channel']}: static {one['static_peak']:.2f} N m, masses and CoGs leave {first:.4f} N m rms"
+    yield from resonance(campaign)
+    for recording, channel, rms, noise, _ in noises(campaign):
+        yield f"{recording} {channel} below 1 Hz: {rms:.5f} N m rms, of which the transducer's noise {noise:.5f}"
+
+
 def resonance(campaign: Processed) -> Iterator[str]:
     """Gains of the torques at the bands' edges and the first pose."""
-    gains = campaign.results["transducer"]["gains"]
+    gains = (campaign.results["transducer"] or {}).get("gains", [])
     for one in gains:
         if one["angle_rad"] == gains[0]["angle_rad"]:
             yield f"{one['channel']} at {one['frequency_Hz']:g} Hz: {one['gain']:.2f}"

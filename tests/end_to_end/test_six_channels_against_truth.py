@@ -57,3 +57,8 @@ def test_only_a_cord_that_no_file_knows_is_noticed(archived: Callable[[str], Pro
     for name, explained in (("EL089", True), ("AL012M00", False)):
         assert {one["explained"] for one in archived(name).results["six_channels"]} == {explained}
     assert archived("AL012_CORD").results.get("six_channels", []) == []
+
+
+def test_the_verdict_is_by_six_channels_but_where_a_cord_pulls(archived: Callable[[str], Processed]) -> None:
+    for name, counts in (("EL089", True), ("AL012M00", False), ("AL012_CORD", False)):
+        assert archived(name).results["requirements"][0].get("together", False) is counts

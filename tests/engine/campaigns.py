@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from engine.encoders import PERFECT, Encoders
@@ -62,6 +62,13 @@ class Campaign:
 
 _CALIBRATION = Run("AZPS_ATA.mcap", "AZPS_ATA", wrench_hz=50.0, encoder_hz=20.0)
 
+# The means of 1996, and of them what the paper asked for afterwards.
+_OF_1996 = ("parameters/rig.toml", "parameters/expected.toml")
+_WORKSHOP = Laboratory(floor=2e-4, tilt=3e-6, joints=2e-3, motors=5e-5)
+_SWITCHING = Encoders(once=(1e-4, 1e-4), twice=(5e-5, 5e-5), bit=(1e-4, 0.0), noise=(1e-4, 0.0))
+_SHORT = Run("AZPS_ATA.mcap", "AZPS_SHORT", wrench_hz=20.0, encoder_hz=5.0, form=SMALLER)
+_EL089 = Run("EL089P00_1.mcap", "EL089_AZ90", wrench_hz=25.0, encoder_hz=10.0, form=SMALLER)
+
 _ALL = (
     Campaign(
         "EL089",
@@ -69,7 +76,7 @@ _ALL = (
         day=0,
         runs=(
             Run("AZPS_ATA.mcap", "AZPS_ATA", encoder_hz=100.0),
-            Run("EL089P00_1.mcap", "EL089P00", encoder_hz=100.0, form=Format()),
+            Run("EL089P00_1.mcap", "EL089P00", encoder_hz=100.0),
             Run("EL089P00_2.mcap", "EL089P00", encoder_hz=100.0),
             Run("EL089P00_3.mcap", "EL089P00", encoder_hz=100.0),
         ),
@@ -196,13 +203,40 @@ _ALL = (
         day=13,
         runs=(
             Run("AZPS_ATA.mcap", "AZPS_RESTS", wrench_hz=20.0, encoder_hz=5.0, form=SMALLER),
-            Run("EL089P00_1.mcap", "EL089_AZ90", wrench_hz=25.0, encoder_hz=10.0, form=SMALLER),
-            Run("EL089P00_2.mcap", "EL089_AZ90", wrench_hz=25.0, encoder_hz=10.0, form=SMALLER),
+            _EL089,
+            replace(_EL089, file="EL089P00_2.mcap"),
             Run("ACQ600_1.mcap", "ACQ600_FAR", wrench_hz=40.0, encoder_hz=5.0, form=SMALLER),
         ),
-        drawn_around=("parameters/rig.toml", "parameters/expected.toml"),
-        laboratory=Laboratory(floor=2e-4, tilt=3e-6, joints=2e-3, motors=5e-5),
-        encoders=Encoders(once=(1e-4, 1e-4), twice=(5e-5, 5e-5), bit=(1e-4, 0.0), noise=(1e-4, 0.0)),
+        drawn_around=_OF_1996,
+        laboratory=_WORKSHOP,
+        encoders=_SWITCHING,
+    ),
+    Campaign(
+        "EL089_ADC",  # the article and the noise of EL089_1996
+        seed=113,
+        day=14,
+        runs=(_SHORT, _EL089),
+        drawn_around=_OF_1996,
+        laboratory=_WORKSHOP,
+        encoders=replace(_SWITCHING, bit=(0.0, 0.0), noise=(0.0, 0.0)),
+    ),
+    Campaign(
+        "DUMMY_1996",
+        seed=114,
+        day=15,
+        runs=(_SHORT, _EL089),
+        drawn_around=_OF_1996,
+        laboratory=_WORKSHOP,
+        encoders=_SWITCHING,
+    ),
+    Campaign(
+        "APM_1996",  # the mechanism of EL089_1996
+        seed=113,
+        day=16,
+        runs=(_SHORT,),
+        drawn_around=_OF_1996,
+        laboratory=_WORKSHOP,
+        encoders=_SWITCHING,
     ),
 )
 

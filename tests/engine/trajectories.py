@@ -136,17 +136,26 @@ def azps_ata() -> Commands:
     return commands(az, el, az.duration())
 
 
-def azps_rests() -> Commands:
-    """Rests of 8 s at nine poses: elevations 70, 78.5 and 87 deg at each of three azimuths, 120 deg apart."""
-    quick = 0.4  # deg/s^2, between the rests only
-    az, el = Axis(-120.0), Axis(70.0).rest(8.0)
-    for turn, step in ((120.0, 8.5), (120.0, -8.5), (0.0, 8.5)):
+def _rests(start: float, turn: float, rest: float, quick: float) -> Commands:
+    """Rests (s) at elevations 70, 78.5 and 87 deg at each of three azimuths; `quick` in deg/s^2 between them."""
+    az, el = Axis(start), Axis(70.0).rest(rest)
+    for by, step in ((turn, 8.5), (turn, -8.5), (0.0, 8.5)):
         for _ in range(2):
-            el = el.move(step, acceleration=quick).rest(8.0)
-        if turn:
-            az = az.rest(el.duration() - az.duration()).move(turn, acceleration=quick)
-            el = el.rest(az.duration() - el.duration() + 8.0)
+            el = el.move(step, acceleration=quick).rest(rest)
+        if by:
+            az = az.rest(el.duration() - az.duration()).move(by, acceleration=quick)
+            el = el.rest(az.duration() - el.duration() + rest)
     return commands(az, el, el.duration())
+
+
+def azps_rests() -> Commands:
+    """Rests of 8 s at nine poses, azimuths 120 deg apart."""
+    return _rests(-120.0, 120.0, 8.0, 0.4)
+
+
+def azps_short() -> Commands:
+    """Rests of 5 s at nine poses, azimuths 60 deg apart."""
+    return _rests(0.0, 60.0, 5.0, 1.0)
 
 
 def _aesing() -> tuple[Axis, Axis]:
@@ -269,6 +278,7 @@ TRAJECTORIES: dict[str, Callable[[], Commands]] = {
     "SWPEL000": swpel000,
     "TRKL0000": trkl0000,
     "AZPS_RESTS": azps_rests,
+    "AZPS_SHORT": azps_short,
     "EL089_AZ90": el089_az90,
     "ACQ600_FAR": acq600_far,
 }

@@ -16,6 +16,7 @@ from kbs_process.reduction.judging import coverage_below, decided, judged
 from kbs_process.results.judged import Budget, BudgetItem, Doubt, Requirement
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Signal
 from kbs_process.stages.bandpass import Band
+from kbs_process.stages.six_channels import Together
 from kbs_process.studies.correlate.summary import conclusion
 
 BAND = Band("lt1Hz", 0.01, 1.0)
@@ -73,6 +74,47 @@ def test_a_silent_channel_that_may_be_swapped_with_a_loud_one_meets_nothing() ->
         "gravity is Ty"
     )
     assert judged(campaign, about_x, runs, budgets, unconfirmed=("Tx", "Ty")).verdict == "pass", "Tx responds"
+
+
+def both_ways(moved: float, together: float, chi_square: float = 1.0) -> Requirement:
+    """Judge a peak that is `moved` by measured forces, +- 0.006 N m, and by all six channels `together`, +- 0.001."""
+    campaign, one = archived.campaign("EL089"), recorded("test", moved)
+    likely = Together(
+        recorded("test", together).pairs["S", "lt1Hz"].measured, np.full(6, 1e-3), np.zeros(6), chi_square
+    )
+    requirement = replace(campaign.requirements[0], limit=0.06)
+    return judged(campaign, requirement, [one], stated("test", 0.006), together={("test", "lt1Hz"): likely})
+
+
+def test_all_six_channels_at_once_count_where_they_agree_with_what_was_moved() -> None:
+    found = both_ways(0.018, 0.004)
+    assert (found.verdict, found.value, found.sigma) == ("pass", pytest.approx(0.004), pytest.approx(0.001))
+    assert found.together
+    (way,) = [one for one in found.ways if one.channel == "Ty"]
+    assert way.agree and way.moved[0] == pytest.approx(0.018) and way.together[0] == pytest.approx(0.004)
+    said = conclusion([found]).sentence
+    assert "By all six channels at once; moved by the measured forces, it is 0.0180" in said
+
+
+@pytest.mark.parametrize(("moved", "together"), [(0.1, 0.004), (0.004, 0.1)])
+def test_where_the_two_disagree_the_worse_counts(moved: float, together: float) -> None:
+    found = both_ways(moved, together)
+    assert (found.verdict, found.value, found.together) == ("fail", pytest.approx(0.1), together > moved)
+    assert "They disagree, so the worse counts." in conclusion([found]).sentence
+
+
+def test_channels_that_rigid_bodies_do_not_explain_count_as_moved() -> None:
+    found = both_ways(0.018, 0.004, chi_square=10.4)
+    assert (found.value, found.together, found.ways) == (pytest.approx(0.018), False, ())
+
+
+def test_what_is_not_known_of_a_gain_counts_in_both_ways() -> None:
+    campaign, one = archived.campaign("EL089"), recorded("test", 0.05)
+    grows = BudgetItem(stage="transducer", source="gain", sigma=0.05 * 0.1 * 0.05, grows=True)  # of an rms of 0.05 / 10
+    budgets = [replace_of(row, contributions=(grows,), total=0.006) for row in stated("test", 0.006)]
+    likely = Together(one.pairs["S", "lt1Hz"].measured, np.full(6, 1e-3), np.zeros(6), 1.0)
+    found = judged(campaign, campaign.requirements[0], [one], budgets, together={("test", "lt1Hz"): likely})
+    assert found.together and found.sigma == pytest.approx(np.hypot(1e-3, 0.05 * 0.05), rel=0.01)
 
 
 def test_a_lower_peak_that_is_less_well_known_decides() -> None:

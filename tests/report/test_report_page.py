@@ -98,6 +98,7 @@ def test_the_verdict_comes_first_with_what_qualifies_it(page: Page) -> None:
         "Residual after each part of the model",
         "and tilt",
         "Is the prediction pessimistic?",
+        "Section 8, line by line",
         "Peak torque at the spacecraft from all six channels at once, below 1 Hz",
         "0.0032 ± 0.0011",
         "11 something else pulls",

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from kbs_process.plant.rigid import inverse_dynamics
-from kbs_process.rig.model import Spacecraft
+from kbs_process.rig.model import Spacecraft, substitute
 from kbs_process.signals.records import WRENCH_CHANNELS, WRENCH_UNITS, Array, Signal
 from kbs_process.stages.six_channels import Together, together
-from kbs_process.stages.to_cog import to_spacecraft
+from kbs_process.stages.to_cog import sigma_at_spacecraft, to_spacecraft
 from plant.rigs import pointing_rig, quantity
 
 RIG = pointing_rig()
@@ -53,6 +53,30 @@ def test_intervals_hold_the_truth_and_are_narrow() -> None:
     assert np.all(found.sigma[TORQUES] < 0.3 * np.std(alone, axis=0)[TORQUES])
     assert found.explained
     assert found.chi_square == pytest.approx(1.0, abs=0.05)
+
+
+def test_both_ways_agree_within_their_noise_and_a_blow_shows() -> None:
+    noise = SIGMA * np.random.default_rng(3).standard_normal((N, 6))
+    found, _ = estimate()
+    plain = to_spacecraft(signal(moved() + noise), S)
+    sigma = sigma_at_spacecraft(SIGMA, S)
+    assert found.agrees(plain, sigma, 4.5).all()
+    blow = np.zeros((N, 6))
+    blow[2000, 4] = 0.05
+    assert found.agrees(plain.derive(plain.values + blow, "a blow"), sigma, 4.5).tolist() == [True] * 4 + [False, True]
+
+
+def test_an_inertia_that_is_not_known_makes_the_estimate_as_unsure() -> None:
+    body = RIG.bodies[-1]
+    sure = {q.name: np.zeros(q.shape) for each in RIG.bodies for q in (each.mass, each.cog, each.inertia)}
+    values = {q.name: q.value for each in RIG.bodies for q in (each.mass, each.cog, each.inertia)}
+    known = together(signal(moved()), Q, SIGMA, substitute(RIG, dict(values), dict(sure)), S)
+    assert known.bodies.tolist() == [0.0] * 6
+    heavier = body.cog.value + np.array([0.01, 0.0, 0.0])
+    unsure = substitute(RIG, dict(values), sure | {body.cog.name: np.array([0.01, 0.0, 0.0])})
+    wrong = together(signal(moved()), Q, SIGMA, substitute(RIG, values | {body.cog.name: heavier}), S)
+    off = np.sqrt(np.mean((wrong.wrench.values - known.wrench.values) ** 2, axis=0))
+    np.testing.assert_allclose(together(signal(moved()), Q, SIGMA, unsure, S).bodies, off, rtol=0.05)
 
 
 @pytest.mark.parametrize("force", [(0.02, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, 0.0, 0.02)])

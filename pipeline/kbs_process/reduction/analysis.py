@@ -127,22 +127,24 @@ def _predict(
 
 
 def _pairs(campaign: Campaign, residual: Signal, disturbance: Signal | None, run: Run) -> dict[tuple[str, str], Pair]:
-    spacecraft = campaign.rig.spacecraft
     pairs = {}
     for band in bands_of(campaign.bands):
         measured, predicted = banded(residual, run, band), None
         if disturbance is not None:  # what commands drive has no gaps of the readings
             of_angles = campaign.drive == "motion"
             predicted = banded(disturbance, run, band) if of_angles else bandpass.apply(disturbance, band)
-        pairs[campaign.rig.frame, band.name] = Pair(measured, predicted)
-        if spacecraft is not None and set(WRENCH_CHANNELS) <= set(measured.channels):
-            whole, foreseen = (
-                None if one is None else to_spacecraft(select(one, WRENCH_CHANNELS), spacecraft)
-                for one in (measured, predicted)
-            )
-            assert whole is not None
-            pairs["S", band.name] = Pair(whole, foreseen)
+        foreseen = {} if predicted is None else framed(campaign, predicted)
+        for frame, one in framed(campaign, measured).items():
+            pairs[frame, band.name] = Pair(one, foreseen.get(frame))
     return pairs
+
+
+def framed(campaign: Campaign, loads: Signal) -> dict[str, Signal]:
+    """Return loads by frame: as recorded, and at the spacecraft where there is one, and all six channels."""
+    spacecraft, found = campaign.rig.spacecraft, {campaign.rig.frame: loads}
+    if spacecraft is not None and set(WRENCH_CHANNELS) <= set(loads.channels):
+        found["S"] = to_spacecraft(select(loads, WRENCH_CHANNELS), spacecraft)
+    return found
 
 
 def _cords(campaign: Campaign, entry: RecordingEntry, wrench: Signal, motion: Motion) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -18,9 +19,11 @@ from kbs_process.results.judged import Doubt
 from kbs_process.signals.records import Signal
 from kbs_process.stages import bandpass
 from kbs_process.stages.bandpass import Band, bridging_error, crossing_rate
+from kbs_process.stages.six_channels import Together
 from kbs_process.stages.verdict import COVERAGE, SEVERITY, Extreme, Judgement, extremes, interval, judge, peak_coverage
 
 _NONE: Mapping[str, float] = {}
+_NO_OTHER: Mapping[tuple[str, str], Together] = {}
 MOSTLY = 0.25  # of a band's filter may lean on what is not known, where a value still tells that something was there
 
 
@@ -32,6 +35,7 @@ class _Candidate:
     sigma: float
     limit: float
     below: float  # sigmas that the true statistic may lie below
+    together: bool = False  # by all six channels at once
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -55,11 +59,14 @@ def judged(
     rounding: Mapping[str, float] = _NONE,
     mute: Sequence[str] = (),
     unconfirmed: Sequence[str] = (),
+    together: Mapping[tuple[str, str], Together] = _NO_OTHER,
 ) -> results.Requirement:
     """Judge a requirement by the channel and recording that are closest to failing it, if no doubt forbids it.
 
     `rounding`: standard deviation, by channel, of readings that are rounded more coarsely than is stated.
     `mute`: channels that no recording shows to respond; `unconfirmed`: those whose slope no load tests.
+    `together`: by recording and band, all six channels at once. It counts at the spacecraft where rigid bodies explain
+    it and it agrees with what was moved by the measured forces; where it does not agree, the worse of both counts.
     """
     band = band_of(requirement, bands_of(campaign.bands))
     key = (requirement.frame, band.name)
@@ -91,6 +98,26 @@ def judged(
             where=requirement.name,
             remedy="record longer, or raise the band's lower edge",
         )
+    both = [
+        _both_ways(
+            one,
+            likely,
+            pair.measured,
+            own,
+            requirement.statistic,
+            band,
+            hides[name],
+            rounding.get(one.extreme.channel, 0.0),
+        )
+        for one in measured
+        for name, pair in pairs
+        if name == one.extreme.recording and requirement.frame == "S"
+        if (likely := together.get((name, band.name))) is not None and likely.explained
+    ]
+    ways = tuple(way for _, way in both)
+    agreed = {(way.recording, way.channel) for way in ways if way.agree}
+    measured = [one for one in measured if (one.extreme.recording, one.extreme.channel) not in agreed]
+    measured += [one for one, _ in both]
     predicted = extremes(
         [(name, pair.predicted) for name, pair in pairs if pair.predicted is not None], channels, requirement.statistic
     )
@@ -139,12 +166,56 @@ def judged(
             if any(one.extreme.channel == channel for one in measured)
         ),
         mute=silent,
+        together=worst.together,
+        ways=ways,
         untested=set(campaign.rig.channels) <= set(unconfirmed),
         source=requirement.source,
         axes=requirement.axes,
         lever_m=None
         if campaign.rig.spacecraft is None or requirement.frame != "S"
         else float(np.linalg.norm(campaign.rig.spacecraft.position.value)),
+    )
+
+
+def _both_ways(
+    moved: _Candidate,
+    likely: Together,
+    signal: Signal,
+    budgets: Mapping[tuple[str | None, str], results.Budget],
+    statistic: Literal["peak", "rms"],
+    band: Band,
+    hidden: float,
+    rounding: float,
+) -> tuple[_Candidate, results.Way]:
+    """The candidate of all six channels at once, beside the one whose `signal` was moved by the measured forces.
+
+    Its uncertainty is that of the estimate, at a peak as many times what grows with it as the peak is above the rms;
+    and in the same proportion what the other's budget has of errors that grow, such as that of a gain.
+    """
+    recording, channel = moved.extreme.recording, moved.extreme.channel
+    at, own = signal.channels.index(channel), budgets[recording, channel]
+    (extreme,), (usual,), (before,) = (
+        extremes([(recording, one)], (channel,), kind)
+        for one, kind in ((likely.wrench, statistic), (likely.wrench, "rms"), (signal, "rms"))
+    )
+    crest = max(extreme.value / usual.value, 1.0) if usual.value > 0.0 else 1.0
+    grows = float(np.sqrt(sum(item.sigma**2 for item in own.contributions if item.grows)))
+    share = grows / before.value if before.value > 0.0 else 0.0
+    sigma = np.sqrt(
+        likely.sigma[at] ** 2
+        + (crest * likely.bodies[at]) ** 2
+        + (share**2 + hidden**2) * extreme.value**2
+        + rounding**2
+    )
+    candidate = replace(moved, extreme=extreme, sigma=float(sigma), together=True)
+    totals = np.array([budgets[recording, name].total for name in signal.channels])
+    agree = bool(likely.agrees(signal, totals, coverage_below("peak", [signal], band))[at])
+    return candidate, results.Way(
+        recording=recording,
+        channel=channel,
+        moved=(moved.extreme.value, *moved.interval),
+        together=(extreme.value, *candidate.interval),
+        agree=agree,
     )
 
 

@@ -58,8 +58,14 @@ def without_forces(loads: Signal, rig: Rig, forces: tuple[Effect, ...], q: Array
     """Return loads (wrench, efforts) less the static ones of `forces` at angles q (n, joints)."""
     if not forces:
         return loads
+    pull = exerted(loads, rig, forces, q)
+    return loads.derive(loads.values - pull.values, f"{pull.history[-1]} removed")
+
+
+def exerted(loads: Signal, rig: Rig, forces: tuple[Effect, ...], q: Array) -> Signal:
+    """Return the static loads of `forces` at angles q (n, joints), on the channels of `loads`."""
     names = ", ".join(effect.name for effect in forces)
-    return loads.derive(loads.values - _pull(rig, forces, q, loads.channels), f"static wrench of {names} removed")
+    return loads.derive(_pull(rig, forces, q, loads.channels), f"static wrench of {names}")
 
 
 def errors(loads: Signal, rig: Rig, forces: tuple[Effect, ...], q: Array) -> Iterator[Signal]:

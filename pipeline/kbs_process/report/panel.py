@@ -85,10 +85,11 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A table's cell with a tone."""
+    """A table's cell with a tone, or a way to another section."""
 
     text: str
     tone: Tone = ""
+    to: str = ""  # key of that section
 
 
 @dataclass(frozen=True, slots=True)

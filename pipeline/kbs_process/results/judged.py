@@ -28,6 +28,16 @@ class ChannelResult(Record, frozen=True, kw_only=True):
     high: float | None = None
 
 
+class Way(Record, frozen=True, kw_only=True):
+    """A statistic at the spacecraft in two ways, each with the interval that holds the true one at 95 %."""
+
+    recording: str
+    channel: str
+    moved: tuple[float, float, float]  # value, low, high: by the measured forces
+    together: tuple[float, float, float]  # by all six channels at once
+    agree: bool  # the second counts; else the worse does
+
+
 class Requirement(Record, frozen=True, kw_only=True):
     """A requirement and what was found: the worst recording and channel decide."""
 
@@ -57,6 +67,8 @@ class Requirement(Record, frozen=True, kw_only=True):
     untested: bool = False  # whether no load tests the sign and axis of any channel
     axes: tuple[str, ...] = ("x", "y", "z")  # that it is about
     left_out: str = ""  # what the campaign leaves out of all this, and the figure of that
+    together: bool = False  # whether the value is that of all six channels at once
+    ways: tuple[Way, ...] = ()  # by recording and channel, where rigid bodies explain all six
     only_without: bool = False  # whether it is met, and what is left out would not be, or is not known to be
     lever_m: float | None = None  # from the transducer to the point about which torques are judged, elsewhere
 
@@ -111,3 +123,7 @@ class Budget(Record, frozen=True, kw_only=True):
     contributions: tuple[BudgetItem, ...]
     total: float
     recording: str | None = None  # None: of all recordings alike
+
+    def part(self, source: str) -> float:
+        """Return what one source contributes, one sigma; zero where it does not."""
+        return next((item.sigma for item in self.contributions if item.source == source), 0.0)

@@ -18,6 +18,9 @@ from kbs_process.stages.bandpass import Band, gain
 
 Filter = Callable[[Signal], Signal]
 
+NOISE = "noise of the transducer, white"
+MATRIX = "what is not known of the matrix"
+CORDS = "what is not known of its cords"
 TWO_OCTAVES = 4.0
 TELLING = 0.1  # least difference of the shares by which noise and drift are told apart in a band
 
@@ -56,7 +59,7 @@ def _root_mean(variance: Array, valid: Mask, moving: Mask | None) -> Array:
 
 def sensor_noise(noise: Array, rate: Array | float, bandwidth: float) -> Entry:
     """White noise of rms `noise` (c,) a sample at `rate` Hz, in a band `bandwidth` Hz wide: noise sqrt(2 B / rate)."""
-    return Entry("transducer", "noise of the transducer, white", noise * np.sqrt(2.0 * bandwidth / rate))
+    return Entry("transducer", NOISE, noise * np.sqrt(2.0 * bandwidth / rate))
 
 
 def from_shapes(stage: str, source: str, shapes: Iterable[Signal], band: Filter, moving: Mask | None = None) -> Entry:
@@ -70,7 +73,7 @@ def from_shapes(stage: str, source: str, shapes: Iterable[Signal], band: Filter,
 
 def cross_coupling(wrench: Signal, sigma: Array) -> Entry:
     """Error of each channel from the uncertainty `sigma` (c, c) of the matrix, for a wrench within the band."""
-    return Entry("cross-coupling", "what is not known of the matrix", np.sqrt(sigma**2 @ rms(wrench) ** 2), grows=True)
+    return Entry("cross-coupling", MATRIX, np.sqrt(sigma**2 @ rms(wrench) ** 2), grows=True)
 
 
 def clock(static: Signal, sigma_s: float, band: Filter, moving: Mask | None = None) -> Entry:

@@ -14,6 +14,7 @@ from kbs_process.stages.gravity.parameters import Index
 from kbs_process.stages.gravity.taring import Taring
 from kbs_process.stages.motion import Motion
 
+ANGLES = "angles: encoder rounding and missed motion"
 _POINTS = 1000  # of a recording at which the shapes are computed, linear in between
 _SLOW = 0.1  # of a recording's greatest rate, below which a joint counts as at rest
 _NEGLIGIBLE = 1e-6  # part of the greatest eigenvalue from which a direction is left out
@@ -67,7 +68,7 @@ def entries(
     rounded = from_shapes("gravity", "", rounding, band, in_motion).sigma
     share = np.mean(in_motion) if in_motion.any() else 1.0
     missed = np.sqrt(np.mean((slope * motion.missed) ** 2, axis=0).sum(axis=1) / share)
-    angles = Entry("gravity", "angles: encoder rounding and missed motion", np.hypot(rounded, missed))
+    angles = Entry("gravity", ANGLES, np.hypot(rounded, missed))
     return parameters, tared, angles
 
 

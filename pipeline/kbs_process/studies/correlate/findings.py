@@ -11,10 +11,11 @@ import numpy as np
 from kbs_process.campaign.config import Campaign
 from kbs_process.plant.laws import select
 from kbs_process.plant.linear.modes import modes
-from kbs_process.reduction.analysis import Analysis, bands_of, passband
+from kbs_process.reduction.analysis import Analysis, banded, bands_of, framed, passband
+from kbs_process.reduction.relief import exerted, forces_in
 from kbs_process.results.judged import Budget, Frame
 from kbs_process.signals.records import COPY
-from kbs_process.stages import repeatability, repeats
+from kbs_process.stages import budget, repeatability, repeats
 from kbs_process.stages.bandpass import Band, BandStatement, statement
 from kbs_process.stages.compare import compare
 from kbs_process.stages.gravity.model import GravityModel
@@ -87,10 +88,10 @@ def _lags(group: Sequence[Analysis]) -> dict[int, float]:
     return lags
 
 
-def merits(campaign: Campaign, runs: Sequence[Analysis], budget: Sequence[Budget]) -> Iterable[results.Merit]:
+def merits(campaign: Campaign, runs: Sequence[Analysis], budgets: Sequence[Budget]) -> Iterable[results.Merit]:
     """Yield the figures of merit of every recording that has a prediction, by frame, band and channel."""
     by_name = {band.name: band for band in bands_of(campaign.bands)}
-    sigma = {(entry.recording, entry.frame, entry.band, entry.channel): entry.total for entry in budget}
+    sigma = {(entry.recording, entry.frame, entry.band, entry.channel): entry.total for entry in budgets}
     for analysis in runs:
         for (frame, name), pair in analysis.pairs.items():
             if pair.predicted is None:
@@ -126,6 +127,25 @@ def resonances(campaign: Campaign, runs: Sequence[Analysis], model: GravityModel
                 results.Resonance(axis=mode.axis, frequency_Hz=mode.frequency, sigma_Hz=mode.sigma, source=source)
             )
     return tuple(found)
+
+
+def rig_forces(campaign: Campaign, runs: Sequence[Analysis]) -> Iterable[results.RigForce]:
+    """Yield what the described forces of the laboratory exert at rest, by band and frame: it was taken off."""
+    for analysis in runs:
+        if not (forces := forces_in(campaign, analysis.entry)):
+            continue
+        pull = exerted(analysis.residual, campaign.rig, forces, analysis.motion.q)
+        for band in bands_of(campaign.bands)[1:]:
+            for frame, signal in framed(campaign, banded(pull, analysis.run, band)).items():
+                for channel, unit, rms in zip(signal.channels, signal.units, budget.rms(signal), strict=True):
+                    yield results.RigForce(
+                        recording=analysis.entry.name,
+                        band=band.name,
+                        frame=_frame(frame),
+                        channel=channel,
+                        unit=unit,
+                        rms=float(rms),
+                    )
 
 
 def _frame(name: str) -> Frame:

@@ -124,6 +124,17 @@ class SixChannels(Record, frozen=True, kw_only=True):
     sigma: dict[str, float]  # of every instant
 
 
+class RigForce(Record, frozen=True, kw_only=True):
+    """What forces of the rig that files describe exert on one channel at rest, in one band; it was taken off."""
+
+    recording: str
+    band: str
+    frame: Frame
+    channel: str
+    unit: str
+    rms: float
+
+
 class Rung(Record, frozen=True, kw_only=True):
     """What the gravity model leaves below 0.3 Hz of the fitted recordings, with this part and those before it."""
 
@@ -374,6 +385,7 @@ class Results(ResultsFile, frozen=True, kw_only=True):
     orders: tuple[OrdersIn, ...] = ()
     budget: tuple[Budget, ...] = ()
     six_channels: tuple[SixChannels, ...] = ()
+    rig_forces: tuple[RigForce, ...] = ()
     pointing: tuple[RecordedPointing, ...] = ()
     instruments: tuple[InstrumentChannel, ...] = ()
     methods: str = ""  # paragraphs, separated by empty lines

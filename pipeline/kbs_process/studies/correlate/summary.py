@@ -15,7 +15,7 @@ from kbs_process.reduction.judging import judged
 from kbs_process.reduction.pointing import judged_pointing, recorded_pointing
 from kbs_process.reduction.soundness.checking import Checked
 from kbs_process.results import provenance
-from kbs_process.results.judged import WRONG, Requirement
+from kbs_process.results.judged import WRONG, Requirement, Way
 from kbs_process.results.pointing import JudgedPointing
 from kbs_process.results.records import Check, Conclusion, InputFile
 from kbs_process.signals.records import Signal
@@ -27,10 +27,10 @@ from kbs_process.stages.gravity.quality import feasibility
 from kbs_process.stages.to_cog import ASSUMPTION
 from kbs_process.stages.verdict import SEVERITY
 from kbs_process.studies.correlate import results
-from kbs_process.studies.correlate.findings import band, merits, repeatabilities, resonances, statements
+from kbs_process.studies.correlate.findings import band, merits, repeatabilities, resonances, rig_forces, statements
 from kbs_process.studies.correlate.methods import methods
 from kbs_process.studies.correlate.notices import model_verdict, notices
-from kbs_process.studies.correlate.uncertainty import budgets, six_channels
+from kbs_process.studies.correlate.uncertainty import all_together, budgets, six_channels
 
 DATED_NS = 315_532_800 * 10**9  # 1980-01-01: no recording is older, but those whose clock counts from its own start
 RESPONSE_UNITS = dict(zip(RESPONSE, ("s", "s^2"), strict=True))
@@ -50,7 +50,8 @@ def summarise(
     repeated = tuple(repeatabilities(runs))
     modes = resonances(campaign, runs, model)
     budget = tuple(budgets(campaign, runs, model, decoupling, stated, repeated, modes, checked.noise, checked.late))
-    told = checked.rounding, checked.mute, checked.unconfirmed
+    together = all_together(campaign, runs, budget, model.rig)
+    told = checked.rounding, checked.mute, checked.unconfirmed, together
     requirements = tuple(
         judged(campaign, requirement, runs, budget, checked.doubts(requirement), *told)
         for requirement in campaign.requirements
@@ -85,7 +86,8 @@ def summarise(
         merit=tuple(merits(campaign, runs, budget)),
         resonances=modes,
         budget=budget,
-        six_channels=tuple(six_channels(campaign, runs, budget)),
+        six_channels=tuple(six_channels(together)),
+        rig_forces=tuple(rig_forces(campaign, runs)),
         pointing=tuple(recorded_pointing(analyses)),
         parameters=tuple(provenance.constants(campaign.rig)),
         notes=(ASSUMPTION,) if campaign.rig.spacecraft is not None else (),
@@ -114,21 +116,37 @@ def conclusion(requirements: Sequence[Requirement], pointed: Sequence[JudgedPoin
         return Conclusion(status="none", sentence="The campaign states no requirement.")
     word = _word(worst)
     value, low, high = (figure or 0.0 for figure in (worst.value, worst.low, worst.high))
+    other = next((one for one in worst.ways if (one.recording, one.channel) == (worst.recording, worst.channel)), None)
+    beside = "" if other is None else _other_way(worst, other)
     unshown = f" Nothing shows a response of {', '.join(worst.mute)}, only noise." if worst.mute else ""
     if worst.untested:
         unshown += " No sign and no axis was tested: the loads change too little for what the files leave open."
     axes = ", ".join(worst.axes)
-    least = f"{low:.4f}" if low > 0.0 else "0"
     sentence = (
         f"{worst.name}: {word}. {worst.statistic.capitalize()} {value:.4f} {worst.unit} "
-        f"({least} to {high:.4f} at 95 %) on {worst.channel} in {worst.recording}, "
+        f"({_span(low, high)} at 95 %) on {worst.channel} in {worst.recording}, "
         f"{worst.band_Hz[0] or 0:g} to {worst.band_Hz[1] or 0:g} Hz; limit {worst.limit:g} {worst.unit}"
         f"{'' if worst.lever_m is None else f', {worst.lever_m:.3g} m from the transducer'}."
-        f"{unshown if worst.verdict == 'pass' else ''}"
+        f"{beside}{unshown if worst.verdict == 'pass' else ''}"
         f"{f' Judged on {axes} alone, as the requirement says.' if len(worst.axes) < 3 else ''}"
         f"{f' {worst.left_out}' if worst.only_without else ''}"
     )
     return Conclusion(status=worst.verdict, sentence=sentence)
+
+
+def _other_way(worst: Requirement, way: Way) -> str:
+    """What the other way to the spacecraft gives, and whether it agrees."""
+    if worst.together:
+        figure, ours, others = way.moved, "all six channels at once", "moved by the measured forces"
+    else:
+        figure, ours, others = way.together, "the measured forces", "by all six channels at once"
+    agree = "" if way.agree else " They disagree, so the worse counts."
+    value, low, high = figure
+    return f" By {ours}; {others}, it is {value:.4f} ({_span(low, high)}).{agree}"
+
+
+def _span(low: float, high: float) -> str:
+    return f"{f'{low:.4f}' if low > 0.0 else '0'} to {high:.4f}"
 
 
 def _word(one: Requirement | JudgedPointing) -> str:
@@ -163,7 +181,8 @@ def with_left_out(
         whole = [one if one.entry == entry else read(entry) for one, entry in zip(left, every, strict=True)]
         stated = statements(bands_of(campaign.bands), whole)
         rows = tuple(budgets(campaign, whole, model, decoupling, stated, found.repeatability, found.resonances, {}, {}))
-        others = [_words(judged(campaign, asked, whole, rows)) for asked in campaign.requirements]
+        together = all_together(campaign, whole, rows, model.rig)
+        others = [_words(judged(campaign, asked, whole, rows, together=together)) for asked in campaign.requirements]
     except KbsError as error:
         others = [("undecided", f"By itself that cannot be judged: {error.what}.")] * len(found.requirements)
     told = []

@@ -11,7 +11,7 @@ from kbs_process.campaign.config import Campaign
 from kbs_process.reduction.analysis import Analysis, banded, bands_of, passband, select
 from kbs_process.reduction.relief import errors, forces_in
 from kbs_process.results.judged import Budget, BudgetItem, Frame
-from kbs_process.rig.model import LAB
+from kbs_process.rig.model import LAB, Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Signal
 from kbs_process.stages import bandpass, budget
 from kbs_process.stages.align.clocks import late_sigma
@@ -19,7 +19,7 @@ from kbs_process.stages.bandpass import Band, BandStatement
 from kbs_process.stages.decouple import Decoupling
 from kbs_process.stages.gravity import error as gravity_error
 from kbs_process.stages.gravity.model import GravityModel
-from kbs_process.stages.six_channels import together
+from kbs_process.stages.six_channels import Together, together
 from kbs_process.stages.to_cog import sigma_at_spacecraft, sigma_of_pose
 from kbs_process.studies.correlate import results
 
@@ -65,33 +65,40 @@ def budgets(
                 yield from _rows(moved, "S", band.name, analysis.entry.name, whole)
 
 
-def six_channels(
-    campaign: Campaign, runs: Sequence[Analysis], budget: Sequence[Budget]
-) -> Iterable[results.SixChannels]:
-    """Yield the torque at the spacecraft that rigid bodies, and all six channels, make likely in every band.
+def all_together(
+    campaign: Campaign, runs: Sequence[Analysis], budget: Sequence[Budget], rig: Rig
+) -> dict[tuple[str, str], Together]:
+    """Return the torque at the spacecraft that rigid bodies, and all six channels, make likely: by recording and band.
 
-    Not where a hand or a cord moves the article: more acts on it than its joints.
+    `rig` has the masses and centres of gravity as fitted. Not where a hand or a cord moves the article: more acts on
+    it than its joints.
     """
-    spacecraft, transducer = campaign.rig.spacecraft, campaign.rig.transducer
-    if spacecraft is None or campaign.drive != "command" or transducer.on != LAB or len(campaign.rig.joints) >= 6:
-        return
+    spacecraft, found = rig.spacecraft, dict[tuple[str, str], Together]()
+    if spacecraft is None or campaign.drive != "command" or rig.transducer.on != LAB or len(rig.joints) >= 6:
+        return found
     for band in bands_of(campaign.bands)[1:]:
         for analysis in runs:
             name, measured = analysis.entry.name, analysis.pairs["T", band.name].measured
             known = {b.channel: b.total for b in budget if (b.recording, b.band, b.frame) == (name, band.name, "T")}
             sigma = np.array([known.get(channel, 0.0) for channel in WRENCH_CHANNELS])
-            if forces_in(campaign, analysis.entry) or not np.all(sigma > 0.0):
-                continue
-            found = together(select(measured, WRENCH_CHANNELS), analysis.motion.q, sigma, campaign.rig, spacecraft)
-            peaks = np.abs(found.wrench.values[measured.valid]).max(axis=0)
-            yield results.SixChannels(
-                recording=name,
-                band=band.name,
-                chi_square=found.chi_square,
-                explained=found.explained,
-                peak=dict(zip(WRENCH_CHANNELS[3:], peaks[3:].tolist(), strict=True)),
-                sigma=dict(zip(WRENCH_CHANNELS[3:], found.sigma[3:].tolist(), strict=True)),
-            )
+            if not forces_in(campaign, analysis.entry) and np.all(sigma > 0.0):
+                wrench = select(measured, WRENCH_CHANNELS)
+                found[name, band.name] = together(wrench, analysis.motion.q, sigma, rig, spacecraft)
+    return found
+
+
+def six_channels(found: Mapping[tuple[str, str], Together]) -> Iterable[results.SixChannels]:
+    """Yield what results.json holds of each."""
+    for (name, band), one in found.items():
+        peaks = np.abs(one.wrench.values[one.wrench.valid]).max(axis=0)
+        yield results.SixChannels(
+            recording=name,
+            band=band,
+            chi_square=one.chi_square,
+            explained=one.explained,
+            peak=dict(zip(WRENCH_CHANNELS[3:], peaks[3:].tolist(), strict=True)),
+            sigma=dict(zip(WRENCH_CHANNELS[3:], np.hypot(one.sigma, one.bodies)[3:].tolist(), strict=True)),
+        )
 
 
 def _entries(
@@ -134,7 +141,7 @@ def _entries(
     forces = forces_in(campaign, analysis.entry)
     if unknown := list(errors(measured, rig, forces, analysis.motion.q)):
         in_motion = gravity_error.moving(analysis.motion)
-        entries.append(budget.from_shapes("rig", "what is not known of its cords", unknown, cut, in_motion))
+        entries.append(budget.from_shapes("rig", budget.CORDS, unknown, cut, in_motion))
     if repeat_noise is not None:
         entries.append(budget.repeatability(repeat_noise, sensor.sigma))
     return entries

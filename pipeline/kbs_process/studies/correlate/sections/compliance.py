@@ -23,6 +23,7 @@ def panel(results: Results, tables: Tables) -> Panel:
     blocks: list[Block] = [_table(results)] if results.requirements else []
     if not results.requirements and not results.judged_pointing:
         blocks.append(Text("This campaign states no requirement; the report compares, and gives no verdict."))
+    blocks.extend(_ways(entry) for entry in results.requirements if entry.ways)
     for entry in results.requirements:
         tone: Tone = "undecided" if entry.only_without else ""
         blocks += [Text(f"{entry.name}: {entry.left_out}", tone=tone)] if entry.left_out else []
@@ -76,6 +77,24 @@ def _table(results: Results) -> Grid:
     )
     sources = list(dict.fromkeys(entry.source for entry in results.requirements if entry.source))
     return Grid("Compliance", head, rows, "llrrrrlrc", _SAYS("table_note", sources=sources))
+
+
+def _ways(entry: Requirement) -> Grid:
+    """Both ways to the spacecraft, on the recording that decides each channel."""
+    deciding = {(one.recording, one.channel) for one in entry.channels}
+    rows = tuple(
+        (
+            way.channel,
+            way.recording,
+            *(f"{number(value)} ({number(low)} to {number(high)})" for value, low, high in (way.together, way.moved)),
+            "yes" if way.agree else Cell("no: the worse counts", "undecided"),
+        )
+        for way in sorted(entry.ways, key=lambda way: way.channel)
+        if (way.recording, way.channel) in deciding
+    )
+    ways = (f"All six channels at once / {unit(entry.unit)}", f"Moved by the measured forces / {unit(entry.unit)}")
+    head = ("Channel", "Recording", *ways, "Agreement")
+    return Grid(f"{entry.name}: both ways to the spacecraft", head, rows, "kkrrl", _SAYS("ways_note"))
 
 
 def _interval(entry: Requirement) -> str:

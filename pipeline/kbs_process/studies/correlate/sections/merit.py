@@ -55,7 +55,9 @@ def _pessimistic(results: Results) -> Grid:
         (
             f"{band_label(results, band)}, {frame_label(frame)}",
             *(
-                _answer([row for row in results.merit if (row.band, row.frame, row.channel) == (band, frame, channel)])
+                pessimistic(
+                    [row for row in results.merit if (row.band, row.frame, row.channel) == (band, frame, channel)]
+                )
                 for channel in channels
             ),
         )
@@ -65,7 +67,8 @@ def _pessimistic(results: Results) -> Grid:
     return Grid("Pessimism by channel", head, tuple(rows), "l" + "c" * len(channels), _SAYS("pessimistic_note"))
 
 
-def _answer(rows: Sequence[Merit]) -> Cell:
+def pessimistic(rows: Sequence[Merit]) -> Cell:
+    """Whether predicted peaks of these rows are no less than measured ones, and of how many that can be said."""
     short = [
         (row.measured_peak - row.predicted_peak, 2.0 * row.sigma)
         for row in rows
