@@ -1,4 +1,4 @@
-"""What was computed is not computed again: only from the same, only as it was, and never more than there is room for."""
+"""What was computed is not computed again: from the same alone, as it was, and no more than there is room for."""
 
 from __future__ import annotations
 

@@ -24,6 +24,7 @@ import numpy as np
 
 import kbs_process
 from kbs_process.cache import find, keep, limit
+from kbs_process.results.code import content
 
 T = TypeVar("T")
 _CONTAINERS: dict[str, Callable[[list[Any]], Any]] = {"tuple": tuple, "list": list, "set": set, "frozenset": frozenset}
@@ -69,20 +70,14 @@ def _key(stage: str, inputs: object) -> str:
 @cache
 def _made_by() -> list[Any]:
     """What computes: this package's files, all others by name and version, and the machine, whose sums may differ."""
-    package = Path(kbs_process.__file__).parent
-    whole = hashlib.sha256()
-    for path in sorted(package.rglob("*")):
-        if path.is_file() and path.suffix != ".pyc" and "__pycache__" not in path.parts:
-            content = path.read_bytes()
-            whole.update(f"{path.relative_to(package)}\n{len(content)}\n".encode() + content)
     folders = [Path(entry) for entry in dict.fromkeys(sys.path) if Path(entry).is_dir()]
     installed = sorted(path.name for folder in folders for path in folder.glob("*-info"))
-    return [whole.hexdigest(), installed, sys.version, platform.machine(), platform.node()]
+    return [content(), installed, sys.version, platform.machine(), platform.node()]
 
 
 def _packed(value: Any, arrays: list[Any]) -> Any:
     """Return a value as a tree of what msgpack knows; its arrays, in C's order or Fortran's, are added to `arrays`."""
-    kind = type(value)
+    kind: Any = type(value)
     if value is None or kind in (bool, int, float, str, bytes):
         return value
     if isinstance(value, np.ndarray):
@@ -99,8 +94,7 @@ def _packed(value: Any, arrays: list[Any]) -> Any:
         return [kind.__name__, *(_packed(one, arrays) for one in ordered)]
     if kind is dict:
         return ["dict", *(_packed(one, arrays) for pair in value.items() for one in pair)]
-    record: Hashable = kind
-    values = [_packed(getattr(value, name), arrays) for name in _fields(record)]
+    values = [_packed(getattr(value, name), arrays) for name in _fields(kind)]
     return ["record", kind.__module__, kind.__qualname__, *values]
 
 
