@@ -8,6 +8,8 @@ from __future__ import annotations
 import itertools
 import multiprocessing
 import os
+import subprocess
+import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -16,6 +18,7 @@ from contextlib import ExitStack, contextmanager
 from types import TracebackType
 from typing import Any, Generic, TypeVar
 
+import kbs_process
 from kbs_process.errors import ConfigError
 from kbs_process.results.code import content
 
@@ -94,6 +97,13 @@ def each(pool: Executor, function: Callable[[Work], Result], work: Iterable[Work
             return
         for future in wait(pending, return_when=FIRST_COMPLETED).done:
             yield pending.pop(future), future.result()
+
+
+def run(words: Sequence[str]) -> tuple[int, str, str]:
+    """Run a command of this program in a process of its own; return its exit status, its output and its complaints."""
+    command = [sys.executable, "-P", "-m", kbs_process.__name__, *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout, done.stderr
 
 
 class Crew(Generic[Held]):
