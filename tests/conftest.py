@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 SPEEDS = ("fast", "slow", "validation")
 FAST_S = 3.0  # a test that takes longer should be marked slow
 
+# What is tested is computed; tests of the cache of stages say so.
+os.environ["KBS_CACHE_MB"] = "0"
 # Bytecode is kept whatever the machine's habit: else each of many processes compiles the package anew, and
 # collecting alone rewrites all assertions, for half a minute.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

@@ -8,7 +8,9 @@ import sys
 from pathlib import Path
 from time import monotonic
 
-from proof.prove import finish, isolation, judge, workers
+from kbs_process.errors import ConfigError
+from kbs_process.results.parallel import workers
+from proof.prove import finish, isolation, judge
 from proof.score import Row
 from proof.seal import SealError
 from proof.words import METHODS, OURS
@@ -38,7 +40,7 @@ def parser() -> argparse.ArgumentParser:
         action="store_true",
         help="do no more: score the trials before the first one, by name, without an answer; the others are lost",
     )
-    options.add_argument("--dask", metavar="ADDRESS", help="scheduler of a Dask cluster, tcp://HOST:PORT")
+    options.add_argument("--scheduler", metavar="ADDRESS", help="scheduler of a Dask cluster, tcp://HOST:PORT")
     return options
 
 
@@ -59,10 +61,11 @@ def main() -> int:
     try:
         work = Work(folder, split, count, asked.seed, command)
         if not asked.answered:
-            with workers(asked.jobs, asked.dask) as pool:
-                finish(work, methods, pool, isolated=isolation(asked.dask), tell=tell)
+            os.nice(5)
+            with workers(asked.jobs, asked.scheduler) as pool:
+                finish(work, methods, pool, isolated=isolation(asked.scheduler), tell=tell)
         rows = judge(work, methods, target, command=command, tell=tell)
-    except (BenchError, SealError) as error:
+    except (BenchError, SealError, ConfigError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     print("\n".join(table(rows)))

@@ -83,6 +83,7 @@ def environment(scratch: Path, path: Sequence[Path] = ()) -> Mapping[str, str]:
         "OPENBLAS_NUM_THREADS": "1",
         "OMP_NUM_THREADS": "1",
         "KBS_CACHE": str(_compiled_code()),
+        "KBS_CACHE_MB": "0",  # what one method has computed is none of another's business
         "PYTHONPATH": os.pathsep.join(str(folder) for folder in path),
     }
 
@@ -93,6 +94,6 @@ def _covered(hidden: Sequence[Path]) -> list[str]:
 
 def _compiled_code() -> Path:
     """Where plants are kept once compiled: half a minute of each trial without it."""
-    from kbs_process.plant.compiled.compile import cache_folder
+    from kbs_process.cache import cache_folder
 
     return cache_folder()

@@ -2,55 +2,20 @@
 
 from __future__ import annotations
 
-import itertools
-import os
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
+from collections.abc import Callable
+from concurrent.futures import Executor
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
-from typing import TypeVar
 
+from kbs_process.results.parallel import each
 from proof import isolate
 from proof.methods import Job, answer_trial
 from proof.page import write_page
 from proof.score import Bench, Row, encode, score
 from proof.trials import make_sealed
-from proof.work import BenchError, Work
+from proof.work import Work
 
-W = TypeVar("W")
-R = TypeVar("R")
 Tell = Callable[[str], None]
-
-_IN_FLIGHT = 64
-_PATIENCE = 10.0  # s, for a scheduler to answer
-
-
-@contextmanager
-def workers(jobs: int, dask: str | None) -> Iterator[Executor]:
-    """Processes of this machine, or the workers of a Dask cluster by the address of its scheduler.
-
-    Work and results travel as bytes: a cluster's workers need a checkout with its environment, no shared files.
-    """
-    if dask is None:
-        with ProcessPoolExecutor(
-            jobs, mp_context=get_context("forkserver"), initializer=os.nice, initargs=(5,)
-        ) as pool:
-            yield pool
-        return
-    try:
-        from distributed import Client
-    except ImportError:
-        raise BenchError("a Dask cluster needs the package distributed\n  -> pip install -e '.[test]'") from None
-    try:
-        client = Client(dask, timeout=_PATIENCE)
-    except (OSError, ValueError) as error:
-        raise BenchError(
-            f"no Dask scheduler answers at {dask}: {error}\n  -> start one with 'dask scheduler'"
-        ) from None
-    with client, client.get_executor(pure=False) as pool:
-        yield pool
 
 
 def finish(
@@ -108,26 +73,13 @@ def judge(work: Work, methods: tuple[str, ...], target: Path, *, command: str, t
     return rows
 
 
-def isolation(dask: str | None) -> str:
+def isolation(scheduler: str | None) -> str:
     """What a method runs in."""
     elsewhere = " (on the machine of this command; each machine of the cluster does what it can)"
-    return _ISOLATION[isolate.level()] + (elsewhere if dask is not None else "")
+    return _ISOLATION[isolate.level()] + (elsewhere if scheduler is not None else "")
 
 
 _ISOLATION = {
     "namespace": "namespaces of its own: the seals' key, the generator, other processes and the network are not there",
     "process": "a process, an environment and a folder of its own, and no more: there are no user namespaces here",
 }
-
-
-def each(pool: Executor, function: Callable[[W], R], work: Iterable[W]) -> Iterator[tuple[W, R]]:
-    """Yield each piece of work with its result as it is done; no more than `_IN_FLIGHT` trials are held at a time."""
-    waiting = iter(work)
-    pending: dict[Future[R], W] = {}
-    while True:
-        for piece in itertools.islice(waiting, _IN_FLIGHT - len(pending)):
-            pending[pool.submit(function, piece)] = piece
-        if not pending:
-            return
-        for future in wait(pending, return_when=FIRST_COMPLETED).done:
-            yield pending.pop(future), future.result()

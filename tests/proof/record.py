@@ -25,6 +25,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
+from kbs_process.results.parallel import each, workers
 from proof import answer, coverage
 from proof.__main__ import table
 from proof.answer import Answer
@@ -35,7 +36,7 @@ from proof.concealed.trials import Kind, Spec
 from proof.isolate import CHECKOUT
 from proof.methods import Job, answer_trial
 from proof.page import write_page
-from proof.prove import each, isolation, workers
+from proof.prove import isolation
 from proof.score import ALL, Bench, encode, score, share
 from proof.truth import Truth
 from proof.words import OURS
@@ -150,7 +151,8 @@ def main() -> None:
     wanted = [*draw(asked.trials), *nulls(asked.nulls)]
     todo = [spec for spec in wanted if name_of(spec) not in known]
     task = partial(answered, cache=asked.cache, method=asked.method)
-    with workers(asked.jobs, None) as pool:
+    os.nice(5)
+    with workers(asked.jobs) as pool:
         for done, (_, one) in enumerate(each(pool, task, todo), start=1):
             known[one.truth.trial] = one
             bench = _bench([known[name] for name in sorted(known)])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import operator
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -19,7 +18,7 @@ from proof import answer, prove
 from proof.answer import Answer, Claim
 from proof.methods import Job, failed
 from proof.words import OURS
-from proof.work import BenchError, Work
+from proof.work import Work
 
 pytestmark = pytest.mark.slow
 
@@ -75,25 +74,6 @@ def test_a_bench_ends_with_a_score_a_ledger_and_a_page(tmp_path: Path) -> None:
     assert values["sparse", "physics"] == 0.0 and values["sparse", "answered"] == 0.0
     assert not any(line.startswith("made") for line in said)
     assert sum("sparse" in line for line in said) == 4 and not any(OURS in line for line in said)
-
-
-@pytest.mark.filterwarnings("ignore")  # of a library that is not ours, on its way up and down
-def test_work_runs_on_a_dask_cluster() -> None:
-    from distributed import LocalCluster
-
-    with (
-        LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
-        prove.workers(1, cluster.scheduler_address) as pool,
-    ):
-        found = dict(prove.each(pool, operator.neg, range(150)))
-    assert found == {k: -k for k in range(150)}
-
-
-@pytest.mark.filterwarnings("ignore")
-def test_a_cluster_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(prove, "_PATIENCE", 0.2)
-    with pytest.raises(BenchError, match="dask scheduler"), prove.workers(1, "tcp://127.0.0.1:9"):
-        pass
 
 
 def test_the_verb_needs_a_checkout(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

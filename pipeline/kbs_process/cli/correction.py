@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kbs_process.cli.shared import FOLDER, examples, verb
+from kbs_process.cli.shared import FOLDER, examples, scheduler_option, verb
 
 if TYPE_CHECKING:
     from kbs_process.campaign.config import Campaign
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         metavar="SHARE",
         help="By how much a friction torque differs from run to run, one sigma, of itself.",
     ),
+    scheduler_option,
     example=("identify campaign/DUMMY1", "identify campaign/DUMMY1 --starts 3 --run-to-run 0.01"),
     output="results/NAME-identify",
     pdf=True,
@@ -61,7 +62,7 @@ def diagnose(campaign: Campaign, **options: Any) -> Outcome:
 
 
 @click.command(
-    epilog=examples("prove", "prove --full --jobs 8", "prove --full --dask tcp://10.0.0.5:8786")
+    epilog=examples("prove", "prove --full --jobs 8", "prove --full --scheduler tcp://10.0.0.5:8786")
     + "\n\nFrom a checkout; an interrupted bench goes on where it stopped. Exit status 1: a find in a trial without "
     "a concealed effect, or a trial without an answer."
 )
@@ -76,9 +77,9 @@ def diagnose(campaign: Campaign, **options: Any) -> Outcome:
     "--output", "-o", type=FOLDER, metavar="FOLDER", help="Where the score goes [default: results/proof/small or full]."
 )
 @click.option("--jobs", type=click.IntRange(1), metavar="N", help="Processes [default: one a core].")
-@click.option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster to run on: tcp://HOST:PORT.")
+@scheduler_option
 def prove(
-    full: bool, trials: int | None, work: Path | None, output: Path | None, jobs: int | None, dask: str | None
+    full: bool, trials: int | None, work: Path | None, output: Path | None, jobs: int | None, scheduler: str | None
 ) -> None:
     """Prove the diagnosis on campaigns with concealed effects.
 
@@ -87,6 +88,6 @@ def prove(
     """
     from kbs_process.studies.prove import run_bench
 
-    given = {"trials": trials, "work": work, "output": output, "jobs": jobs, "dask": dask}
+    given = {"trials": trials, "work": work, "output": output, "jobs": jobs, "scheduler": scheduler}
     options = [f"--{name}={value}" for name, value in given.items() if value is not None]
     sys.exit(run_bench([*(["--full"] if full else []), *options]))

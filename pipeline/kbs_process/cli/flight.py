@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kbs_process.cli.shared import commanded_by, verb
+from kbs_process.cli.shared import commanded_by, scheduler_option, verb
 
 if TYPE_CHECKING:
     from kbs_process.campaign.config import Campaign
@@ -20,6 +20,7 @@ _SEED = click.option("--seed", type=click.IntRange(0), default=0, show_default=T
     *commanded_by("Commands from a table, as for simulate."),
     click.option("--samples", type=click.IntRange(2), default=200, show_default=True, help="Units to fly."),
     _SEED,
+    scheduler_option,
     example=("flight campaign/EL089", "flight campaign/EL089 --command slew.csv --samples 500 --seed 3"),
     output="results/NAME-flight",
     pdf=True,
@@ -42,7 +43,7 @@ def flight(campaign: Campaign, trajectory: str | None, command: Path | None, **o
     click.option(
         "--samples",
         type=click.IntRange(0),
-        default=16,
+        default=8,
         show_default=True,
         help="Units that fly the day beside the nominal one; fewer than two: none.",
     ),

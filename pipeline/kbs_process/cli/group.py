@@ -39,7 +39,8 @@ class CampaignGroup(click.Group):
     epilog=examples("campaign/EL089", "campaign/EL089 --check", "validate campaign/EL089", "VERB --help")
     + "\n\nExit status: 0 done; 1 a requirement is not met or undecided, a recording has losses, or (validate) the "
     "model of the rig is wrong (only with --check); 2 bad input; 70 a fault of kbs-process; 130 interrupted. With "
-    "--debug, any error shows its traceback.",
+    "--debug, any error shows its traceback.\n\nEnvironment: stages are kept in a cache folder, and not computed again "
+    "from the same inputs. KBS_CACHE=FOLDER is that folder; KBS_CACHE_MB=2000 is its limit, KBS_CACHE_MB=0 keeps none.",
     subcommand_metavar="CAMPAIGN | VERB ...",
 )
 @click.version_option(__version__, prog_name="kbs-process")

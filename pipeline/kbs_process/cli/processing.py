@@ -24,6 +24,7 @@ from kbs_process.cli.shared import (
     quiet_option,
     say,
     say_json,
+    scheduler_option,
 )
 from kbs_process.errors import ConfigError, FitError, RecordingError, SimulationError
 
@@ -32,8 +33,14 @@ if TYPE_CHECKING:
     from kbs_process.progress import Progress
 
 
-@click.command(epilog=examples("campaign/EL089", "process campaign/EL089 --check --output /data/EL089"))
-@campaign_argument
+@click.command(
+    epilog=examples(
+        "campaign/EL089",
+        "process campaign/EL089 --check --output /data/EL089",
+        "campaign/EL089 campaign/EL089_FM --no-diagnose",
+    )
+)
+@click.argument("campaigns", metavar="CAMPAIGN...", nargs=-1, required=True)
 @output_option("results/NAME")
 @pdf_option
 @check_option("a requirement is not met, or undecided, or a recording has losses")
@@ -44,13 +51,30 @@ if TYPE_CHECKING:
     help="Find out why, where recordings differ from the prediction by more than repeats do: takes minutes, after the "
     "report is written [default: if the recordings allow it].",
 )
+@scheduler_option
 @quiet_option
-def process(campaign: str, output: Path | None, pdf: bool | None, check: bool, why: bool | None, quiet: bool) -> None:
-    """Process CAMPAIGN: fit, compare with the prediction, and write the report.
+def process(
+    campaigns: tuple[str, ...],
+    output: Path | None,
+    pdf: bool | None,
+    check: bool,
+    why: bool | None,
+    scheduler: str | None,
+    quiet: bool,
+) -> None:
+    """Process each CAMPAIGN: fit, compare with the prediction, and write the report.
 
     Where the two differ by more than repeats of one trajectory do, a diagnosis follows. One of the same inputs that
     is in the results already stays until a new one replaces it.
+
+    Several campaigns are processed side by side, by the cores of this machine or by a cluster that sees the same files.
+    With --output, the results of each are in a folder of its name below that. The exit status is the highest of all.
     """
+    if len(campaigns) > 1 or scheduler is not None:
+        switches = {"--pdf": pdf, "--no-pdf": pdf is False, "--check": check, "--diagnose": why}
+        given = [name for name, wanted in {**switches, "--no-diagnose": why is False}.items() if wanted]
+        sys.exit(_each_of(campaigns, output, given, scheduler))
+    (campaign,) = campaigns
     from kbs_process.campaign.load import load_campaign
     from kbs_process.campaign.locate import find_campaign, results_folder
     from kbs_process.studies.correlate.earlier_diagnosis import earlier_diagnosis
@@ -76,6 +100,27 @@ def process(campaign: str, output: Path | None, pdf: bool | None, check: bool, w
         sys.exit(INTERRUPTED)
     if check and outcome.failed:
         sys.exit(NOT_MET)
+
+
+def _each_of(campaigns: tuple[str, ...], output: Path | None, given: list[str], scheduler: str | None) -> int:
+    """Process campaigns by workers; tell what each says when it is done, and return the highest status."""
+    from kbs_process.campaign.locate import find_campaign, results_folder
+    from kbs_process.results.parallel import each, run, workers
+
+    folders = {find_campaign(name).absolute(): name for name in campaigns}
+    if len({folder.name for folder in folders}) < len(campaigns):
+        raise click.UsageError("Two campaigns have the same name, so that one's results would replace the other's.")
+    commands = {}
+    for folder, name in folders.items():
+        target = results_folder(folder, None if output is None else output / folder.name).absolute()
+        commands["process", str(folder), "--quiet", *given, "--output", str(target)] = name
+    worst = 0
+    with workers(scheduler=scheduler) as pool:
+        for command, (status, said, complaint) in each(pool, run, commands):
+            say(f"{commands[command]}:", *said.splitlines())
+            complain(*complaint.splitlines())
+            worst = max(worst, status)
+    return worst
 
 
 def _diagnose(campaign: Campaign, results: Path, *, progress: Progress, pdf: bool | None, wanted: bool) -> None:

@@ -30,6 +30,11 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, 
 pdf_option = click.option(
     "--pdf/--no-pdf", default=None, help="A report.pdf beside the page [default: if WeasyPrint is installed]."
 )
+scheduler_option = click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Run on a Dask cluster that is there: its scheduler, tcp://HOST:PORT [default: the cores of this machine].",
+)
 
 
 def output_option(default: str) -> Callable[[_Verb], _Verb]:

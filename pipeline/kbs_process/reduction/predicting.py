@@ -9,6 +9,7 @@ import numpy as np
 
 from kbs_process.errors import RecordingError
 from kbs_process.plant.predict import Schedule, predict
+from kbs_process.results.kept import kept
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Events, Run, Signal
 from kbs_process.stages.align.condense import CondenseSettings, condense
@@ -89,18 +90,30 @@ def predict_run(
     wrench = run.wrench
     if wrench is None:
         raise RecordingError("this recording has no wrench to predict", where=run.name)
-    blocks = predict(
-        rig,
-        effects,
-        approached(schedule_of(run, rig)),
-        rate_Hz=run.rates["wrench"],
-        angle_rate_Hz=run.rates.get("angle", wrench.rate),
-        duration_s=wrench.t0 + len(wrench) * wrench.dt,
-        quantise=False,
-        progress=progress,
+    schedule = approached(schedule_of(run, rig))
+    rate, angle_rate, duration = (
+        run.rates["wrench"],
+        run.rates.get("angle", wrench.rate),
+        wrench.t0 + len(wrench) * wrench.dt,
     )
-    channels = {"wrench": WRENCH_CHANNELS, "angle": rig.joint_names, "field": rig.joint_names}
-    predicted = condense(run.name, blocks, channels, settings, keep_spikes=True)
+
+    def made() -> Run:
+        blocks = predict(
+            rig,
+            effects,
+            schedule,
+            rate_Hz=rate,
+            angle_rate_Hz=angle_rate,
+            duration_s=duration,
+            quantise=False,
+            progress=progress,
+        )
+        channels = {"wrench": WRENCH_CHANNELS, "angle": rig.joint_names, "field": rig.joint_names}
+        return condense(run.name, blocks, channels, settings, keep_spikes=True)
+
+    predicted = kept(
+        "prediction", (run.name, rig, tuple(effects), schedule, rate, angle_rate, duration, settings), made
+    )
     start = commanded_from(run)
     return replace(predicted, wrench=_known(predicted.wrench, start), angle=_known(predicted.angle, start))
 

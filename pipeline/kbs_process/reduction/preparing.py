@@ -8,10 +8,12 @@ from dataclasses import dataclass, field, replace
 from kbs_process.campaign.config import Campaign, RecordingEntry
 from kbs_process.errors import RecordingError
 from kbs_process.progress import Progress
-from kbs_process.reduction.held import read_alive
+from kbs_process.reduction.held import noisy, read_alive
 from kbs_process.reduction.losses import foremost
 from kbs_process.reduction.relief import forces_in, relieved, without_effects
 from kbs_process.reduction.settings import gravity_settings, motion_settings
+from kbs_process.results.kept import kept
+from kbs_process.results.provenance import sha256
 from kbs_process.signals.records import COPY, Loss, Run, Signal
 from kbs_process.stages import decouple, motion
 from kbs_process.stages.align.prints import Printed, Prints
@@ -41,10 +43,7 @@ def prepare(
 ) -> Prepared:
     """Read a recording as processing needs it; `keep_spikes`: with its single bad samples."""
     with progress.task(f"Reading {entry.name}"):
-        watch, printed = Watch(), Printed()
-        run = read_alive(
-            campaign, entry, keep=True, keep_spikes=keep_spikes, watch=lambda blocks: printed(watch(blocks))
-        )
+        run, readings, prints = _read(campaign, entry, keep_spikes)
         if run.loads is None:
             raise RecordingError("there is neither wrench nor effort in this recording", where=str(entry.path))
         return Prepared(
@@ -52,9 +51,26 @@ def prepare(
             run.loads,
             decouple.apply(run, decoupling),
             motion.estimate(run, campaign.rig, motion_settings(campaign)),
-            watch.streams,
-            printed.channels,
+            readings,
+            prints,
         )
+
+
+def _read(
+    campaign: Campaign, entry: RecordingEntry, keep_spikes: bool
+) -> tuple[Run, Mapping[str, Readings], Sequence[Prints]]:
+    """Read a recording through, unless that was done before."""
+
+    def read() -> tuple[Run, Mapping[str, Readings], Sequence[Prints]]:
+        watch, printed = Watch(), Printed()
+        run = read_alive(
+            campaign, entry, keep=True, keep_spikes=keep_spikes, watch=lambda blocks: printed(watch(blocks))
+        )
+        return run, watch.streams, printed.channels
+
+    file = entry.path, sha256(entry.path), entry.name, entry.start, entry.end
+    of_channels = campaign.rig.transducer.channels, noisy(campaign.rig)
+    return kept("reading", (file, campaign.topics, campaign.bands.working_rate, *of_channels, keep_spikes), read)
 
 
 def told_copies(prepared: Sequence[Prepared]) -> list[Prepared]:
@@ -75,11 +91,12 @@ def fit_gravity(campaign: Campaign, prepared: Sequence[Prepared], progress: Prog
     A rig that is driven by its motion has its inertia fitted too; its commands, if any, drive nothing.
     """
     with progress.task("Fitting gravity and centres of gravity"):
-        return gravity.fit(
-            samples(campaign, prepared),
-            campaign.rig,
-            include_inertia=campaign.drive == "motion",
-            settings=gravity_settings(campaign),
+        moving, settings = campaign.drive == "motion", gravity_settings(campaign)
+        fitted = samples(campaign, prepared)
+        return kept(
+            "gravity",
+            (fitted, campaign.rig, moving, settings),
+            lambda: gravity.fit(fitted, campaign.rig, include_inertia=moving, settings=settings),
         )
 
 

@@ -11,10 +11,14 @@ from typing import Any
 
 from kbs_process.errors import OutputError
 from kbs_process.report.document import Document
+from kbs_process.results.kept import kept
 from kbs_process.results.outcome import Outcome
+from kbs_process.results.provenance import sha256
 from kbs_process.results.records import FILE, ResultsFile, encode
+from kbs_process.results.store import files_in
 
 _REMEDY = 'install the extra: pip install "kbs-process[pdf]" (weasyprint also needs the Pango library)'
+_MADE = ("index.html", "report.pdf")  # of all else in the folder
 _EPOCH = "0"  # the date written into embedded fonts: none of the results' business, hence fixed
 
 
@@ -25,12 +29,15 @@ def build(results: Path, document: Document[Any], pdf: bool | None = None) -> Pa
     """
     from kbs_process.report import page  # draws: matplotlib costs most of a second to import
 
-    head, sections = document.read(results)
+    made_of = {name: sha256(results / name) for name in files_in(results) if name not in _MADE}
+    head, sections = kept("report", (document.title, made_of), lambda: document.read(results))
     target = results / "index.html"
     try:
         _replace(target, page.render(head, sections, "screen").encode())
         if pdf or (pdf is None and available()):
-            _replace(results / "report.pdf", to_pdf(page.render(head, sections, "paper")))
+            paper = page.render(head, sections, "paper")
+            dated = os.environ.get("SOURCE_DATE_EPOCH")
+            _replace(results / "report.pdf", kept("paper", (paper, dated), lambda: to_pdf(paper)))
     except OSError as error:
         raise OutputError(
             f"cannot write the report: {error.strerror or error}",

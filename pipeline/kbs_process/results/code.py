@@ -34,9 +34,16 @@ def source(package: Path = Path(kbs_process.__file__).parent) -> str:
 
 
 @cache
-def _digest(package: Path) -> str:
+def content(package: Path = Path(kbs_process.__file__).parent) -> str:
+    """Return the SHA-256 of all files of the package: what computes the same has the same."""
+    return _digest(package, "*")
+
+
+@cache
+def _digest(package: Path, which: str = "*.py") -> str:
     whole = hashlib.sha256()
-    names = sorted(path.relative_to(package).as_posix() for path in package.rglob("*.py"))
+    files = (path for path in package.rglob(which) if path.is_file() and "__pycache__" not in path.parts)
+    names = sorted(path.relative_to(package).as_posix() for path in files)
     for name in names:
         content = (package / name).read_bytes()
         whole.update(f"{name}\n{len(content)}\n".encode() + content)

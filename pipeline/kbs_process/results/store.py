@@ -227,14 +227,14 @@ def _files_of_the_user(target: Path, made: str, *, revised: Collection[str] | No
         return []
     written = {name: digest for digest, name in _listed(target)}
     theirs = not target.is_dir() or (any(target.iterdir()) and not _is_ours(target) and revised is None)
-    if theirs or (written and made not in {*written, *_files(target)}):
+    if theirs or (written and made not in {*written, *files_in(target)}):
         raise OutputError(
             f"is there already, and kbs-process did not make it, or as something else (no {made}): nothing was changed",
             where=str(target),
             remedy="name a new or an empty folder",
         )
     users = []
-    for name in _files(target):
+    for name in files_in(target):
         if name not in written:
             if written or name.partition("/")[0] not in (revised or ()):
                 users.append(name)
@@ -247,7 +247,7 @@ def _files_of_the_user(target: Path, made: str, *, revised: Collection[str] | No
     return users
 
 
-def _files(folder: Path) -> list[str]:
+def files_in(folder: Path) -> list[str]:
     """Return the names of all files and links below a folder, save the list of them, in order."""
     names = []
     for root, folders, files in os.walk(folder):
@@ -266,7 +266,7 @@ def _digest(path: Path) -> str:
 
 def _list_files(folder: Path, *, save: Collection[str]) -> None:
     """Write the list of a folder's files, `save` those of the user, as `sha256sum` does."""
-    names = [name for name in _files(folder) if name not in set(save)]
+    names = [name for name in files_in(folder) if name not in set(save)]
     (folder / LIST).write_text("".join(f"{_digest(folder / name)}  {name}\n" for name in names), encoding="utf-8")
 
 

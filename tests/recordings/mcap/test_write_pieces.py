@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.records import Message
+from mcap.writer import Writer
 
 from kbs_process.errors import RecordingError
-from kbs_process.recordings.mcap import writer
+from kbs_process.recordings.mcap import chunks, writer
 from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.recordings.mcap.streams import Stream
@@ -53,10 +54,38 @@ def test_pieces_of_any_size_give_the_bytes_of_the_whole(tmp_path: Path, monkeypa
         assert (tmp_path / "pieces.mcap").read_bytes() == (tmp_path / "whole.mcap").read_bytes()
 
 
+def test_the_bytes_are_those_of_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which writes one message after the other: chunks, indexes and summary alike."""
+    monkeypatch.setattr(chunks, "CHUNK", 1 << 14)
+    stamp = START + 3_000_000 * np.arange(300)
+    joints = OutStream(
+        "/j", "joints", stamp, stamp + 7, np.random.default_rng(1).normal(size=(300, 4)), ("az", "b\u00e9")
+    )
+    wrench = OutStream("/w", "wrench", stamp, stamp, np.full((300, 6), np.nan), frame="transducer")
+    path = tmp_path / "a.mcap"
+    write_mcap(path, [temperature(0, 3000), joints, wrench, temperature(0, 0, every=5)])
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        summary, found = reader.get_summary(), list(reader.iter_messages(log_time_order=False))
+    assert summary is not None
+    with (tmp_path / "b.mcap").open("wb") as file:
+        library = Writer(file, chunk_size=1 << 14, enable_data_crcs=True)
+        library.start(profile="ros2", library="kbs-process")
+        for number, channel in summary.channels.items():
+            schema = summary.schemas[channel.schema_id]
+            assert library.register_schema(schema.name, schema.encoding, schema.data) == channel.schema_id
+            assert library.register_channel(channel.topic, channel.message_encoding, channel.schema_id) == number
+        for _, _, one in found:
+            library.add_message(one.channel_id, one.log_time, one.data, one.publish_time, one.sequence)
+        library.finish()  # type: ignore[no-untyped-call]
+    assert len(found) == 3600
+    assert (tmp_path / "b.mcap").read_bytes() == path.read_bytes()
+
+
 @pytest.mark.slow
 def test_memory_does_not_grow_with_the_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(writer, "BATCH", 2000)
-    monkeypatch.setattr(writer, "CHUNK", 1 << 16)
+    monkeypatch.setattr(chunks, "CHUNK", 1 << 16)
     write_pieces(tmp_path / "a.mcap", pieces(100, 10))  # whatever is made once only
     peaks = []
     for count in (10_000, 40_000):

@@ -120,6 +120,15 @@ def test_an_order_stands_upright_in_the_map() -> None:
     assert not shown[-1] or cells.at[-1] * 12.0 < BAND
 
 
+def test_a_motion_that_repeats_itself_has_no_rows_of_no_height() -> None:
+    """Its windows have the same few rates, apart by rounding."""
+    rates = np.repeat([0.05, 0.1, 0.2, 0.4], 1000)
+    rates *= 1.0 + 1e-15 * np.random.default_rng(1).integers(-2, 3, len(rates))
+    track = track_of(rates)
+    cells = waterfall(track, np.zeros((len(T), 1)), 2.0, 12)
+    assert len(np.unique(cells.at.astype(np.float32))) == len(cells.at) < 24
+
+
 def test_time_grows_with_length_alone() -> None:
     """Ten times the recording has ten times the windows, of the same size each."""
     long = track_of(np.tile(RATES["many turns"], 10))

@@ -18,6 +18,7 @@ from typing import Any, cast
 
 import numba
 
+from kbs_process.cache import cache_folder
 from kbs_process.plant.compiled import elementary, kernels
 from kbs_process.plant.compiled.generate import module_text
 from kbs_process.plant.compiled.lanes import lanes_text
@@ -70,17 +71,6 @@ def compiled_module(kind: str, text: str, modules: Iterable[ModuleType | None]) 
         spec.loader.exec_module(module)
         sys.modules[name] = module
         return module
-
-
-def cache_folder() -> Path:
-    """Return where compiled plants are kept: $KBS_CACHE, or the platform's folder for caches."""
-    if chosen := os.environ.get("KBS_CACHE"):
-        return Path(chosen)
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "kbs-process" / "Cache"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "kbs-process"
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "kbs-process"
 
 
 def _fingerprint(text: str, called: Iterable[ModuleType | None]) -> str:

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from hashlib import blake2b
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-from mcap.writer import CompressionType, Writer
+from numpy.typing import NDArray
 
 from kbs_process.errors import OutputError
-from kbs_process.recordings.mcap.messages.encoding import TYPES, OutStream, payloads, ros2_schema
+from kbs_process.recordings.mcap.chunks import ChunkedFile, message_records
+from kbs_process.recordings.mcap.messages.encoding import OutStream
 from kbs_process.recordings.mcap.source import open_recording
 from kbs_process.recordings.mcap.streams import Stream
-from kbs_process.signals.records import Block
+from kbs_process.signals.records import Block, Stamps
 
-CHUNK = 1 << 20  # bytes, uncompressed
 BATCH = 1 << 16  # messages gathered before some are written
 HOLD = 1 << 20  # messages that wait for older ones of another topic
+_TOGETHER = 1 << 13  # messages that are laid out at a time
 
 
 def write_mcap(path: Path, streams: Sequence[OutStream]) -> None:
@@ -115,54 +116,61 @@ class _Topic:
 
 def _write(file: BinaryIO, pieces: Iterable[OutStream], hold: int) -> list[_Topic]:
     """Write the pieces; return their topics."""
-    writer = Writer(file, chunk_size=CHUNK, compression=CompressionType.ZSTD, enable_data_crcs=True)
+    whole: ChunkedFile | None = None
     topics: dict[str, _Topic] = {}
     waiting, due = 0, BATCH
     for piece in pieces:
-        if not topics:
-            writer.start(profile="ros2", library="kbs-process")
+        whole = whole or ChunkedFile(file, "ros2")
         if piece.topic not in topics:
-            topics[piece.topic] = _Topic(piece, _register(writer, piece))
+            topics[piece.topic] = _Topic(piece, whole.channel(piece))
         elif waiting >= due:  # only now: before a topic comes again, others may still be unknown
             limit = min(topic.latest for topic in topics.values())
             if waiting > hold:
                 logs = np.sort(np.concatenate([topic.logs() for topic in topics.values()]))
                 limit = max(limit, int(logs[len(logs) - hold // 2]))
-            waiting -= _flush(writer, list(topics.values()), limit)
+            waiting -= _flush(whole, list(topics.values()), limit)
             due = waiting + BATCH
         topics[piece.topic].add(piece)
         waiting += len(piece.log)
-    if not topics:
-        writer.start(library="kbs-process")
-    _flush(writer, list(topics.values()), (1 << 63) - 1)
-    writer.finish()  # type: ignore[no-untyped-call]
+    whole = whole or ChunkedFile(file, "")
+    _flush(whole, list(topics.values()), (1 << 63) - 1)
+    whole.finish()
     return list(topics.values())
 
 
-def _flush(writer: Writer, topics: Sequence[_Topic], limit: int) -> int:
+def _flush(whole: ChunkedFile, topics: Sequence[_Topic], limit: int) -> int:
     """Write the messages older than `limit`, of equal age in the order of the topics; return how many."""
     ready = [topic.take(limit) for topic in topics]
-    order = np.argsort(np.concatenate([stream.log for stream in ready]), kind="stable") if ready else ()
-    which = np.repeat(np.arange(len(ready)), [len(stream.log) for stream in ready])[order].tolist()
-    rows = [_messages(stream, topic.written.count) for stream, topic in zip(ready, topics, strict=True)]
-    for number in which:
-        log, stamp, sequence, payload = next(rows[number])
-        writer.add_message(topics[number].number, log, payload, publish_time=stamp, sequence=sequence)
+    logs = np.concatenate([np.zeros(0, dtype=np.int64), *(stream.log for stream in ready)])
+    order = np.argsort(logs, kind="stable")
+    which = np.repeat(np.arange(len(ready)), [len(stream.log) for stream in ready])[order]
+    done = [0] * len(ready)
+    for begin in range(0, len(which), _TOGETHER):
+        these = which[begin : begin + _TOGETHER]
+        rows = []
+        for k, count in enumerate(np.bincount(these, minlength=len(ready)).tolist()):
+            part = _part(ready[k], slice(done[k], done[k] + count))
+            rows.append(message_records(part, topics[k].number, topics[k].written.count + done[k]))
+            done[k] += count
+        numbers = np.array([topic.number for topic in topics])[these]
+        sizes = np.array([own.shape[1] for own in rows])[these]
+        whole.add(numbers, logs[order[begin : begin + _TOGETHER]], sizes, _merged(rows, these, sizes))
     for topic, stream in zip(topics, ready, strict=True):
         topic.written.add(stream)
     return len(which)
 
 
-def _messages(stream: OutStream, first: int) -> Iterator[tuple[int, int, int, bytes]]:
-    """Yield (log, stamp, sequence, payload); `first` is the sequence number of the first."""
-    rows = zip(stream.log.tolist(), stream.stamp.tolist(), payloads(stream), strict=True)
-    for sequence, (log, stamp, payload) in enumerate(rows, start=first):
-        yield log, stamp, sequence, payload
+def _part(stream: OutStream, rows: slice) -> OutStream:
+    return replace(stream, stamp=stream.stamp[rows], log=stream.log[rows], values=stream.values[rows])
 
 
-def _register(writer: Writer, stream: OutStream) -> int:
-    schema = writer.register_schema(TYPES[stream.kind], "ros2msg", ros2_schema(stream.kind))
-    return writer.register_channel(stream.topic, "cdr", schema)
+def _merged(rows: Sequence[NDArray[np.uint8]], which: Stamps, sizes: Stamps) -> NDArray[np.uint8]:
+    """Records of several topics, one after the other, in the order `which` (n,)."""
+    starts = np.cumsum(sizes) - sizes
+    merged = np.empty(int(sizes.sum()), dtype=np.uint8)
+    for k, own in enumerate(rows):
+        merged[starts[which == k][:, None] + np.arange(own.shape[1])] = own
+    return merged
 
 
 def _verify(path: Path, topics: Sequence[_Topic]) -> None:

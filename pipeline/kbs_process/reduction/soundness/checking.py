@@ -24,6 +24,7 @@ from kbs_process.reduction.soundness import words
 from kbs_process.reduction.soundness.noise import measured_noise, unlike_stated
 from kbs_process.reduction.soundness.streams import copied, mistimed, repeated, stuck
 from kbs_process.results.judged import WRONG, Doubt, Soundness
+from kbs_process.results.kept import kept
 from kbs_process.results.records import Notice
 from kbs_process.rig.model import Rig
 from kbs_process.signals.records import WRENCH_CHANNELS, Array, Mask
@@ -175,66 +176,71 @@ class _Evidence:
 def check_model(campaign: Campaign, recordings: Sequence[Prepared], model: GravityModel, progress: Progress) -> Checked:
     """Compare what was fitted with what was known, and look for what would explain a difference."""
     with progress.task("Comparing the rig with what was known of it"):
-        tared = [
-            tare(campaign, one.entry, relieved(campaign, one.entry, one.run, one.motion), one.motion, model)
-            for one in recordings
-        ]
-        samples = [sample for sample, _ in tared]
-        equation = model.equation
-        low_pass, theta = model.settings.low_pass_Hz, model.fit.value[: equation.size]
-        instants = [prepared(sample, equation, model.settings, low_pass, theta) for sample in samples]
-        constants = np.stack([taring.bias for _, taring in tared])
-        shown = [_read_and_due(one, data, model) for one, data in zip(recordings, instants, strict=True)]
-        readings = [read for read, _, _ in shown]
-        conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, constants, shown))
-        tested = {one.channel for one in conventions if one.testable and one.channel}
-        white = [measured_noise(model.rig, one)[1] for one in recordings]
-        lags = [(one, own) for one, data in zip(recordings, instants, strict=True) if (own := lag(model, data))]
-        late = [_late(campaign, one, own) for one, own in lags if own.taken >= TAKEN]
-        misled = _misread_alone(model, instants, {sample.name for sample, taring in tared if taring.fitted})
-        shows = shown_gains(equation, instants)
-        gains = tuple(_read_gains(equation, {key: of for key, of in shows.items() if key not in tested}))
-        evidence = _Evidence(
-            campaign,
-            model,
-            samples,
-            instants,
-            conventions,
-            _most(equation) if tested else _most_of_untested(equation, readings, white),
-            tension(model, {sample.name: taring for sample, taring in tared}, (*late, *misled, *gains)),
-            late,
-            misled,
-            gains,
-            timed=tuple(mistimed(campaign, recordings)),
-            still=tuple(stuck(recordings, instants, model)),
-            twice=tuple(repeated(recordings)),
-        )
-        reasons = evidence.reasons()
-        told, calibrated = evidence.suggestions(reasons) if reasons else ((), True)
-        soundness = Soundness(
-            sound=not reasons,
-            probability=evidence.tension.probability,
-            gains={key: sigma for key, (_, sigma, _) in shows.items()},
-            beyond=tuple(words.beyond(one, model) for one in evidence.tension.beyond) if reasons else (),
-            reasons=reasons,
-            suggestions=tuple(told),
-            calibrated=calibrated,
-        )
-        judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
-        channels = model.rig.transducer.channels
-        return Checked(
-            soundness,
-            conventions,
-            hidden={one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements},
-            rounding={key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()},
-            noise={
-                one.entry.name: dict(zip(channels, rms.tolist(), strict=True))
-                for one, rms in zip(recordings, white, strict=True)
-            },
-            mute=tuple(key for key in _mute(equation, readings) if key in judged),
-            unconfirmed=tuple(key for key in equation.channels if key not in tested),
-            late={own.recording: abs(own.value) for _, own in lags if abs(own.value) > BEYOND * own.chance},
-        )
+        inputs = campaign, list(recordings), model
+        return kept("check of the model", inputs, lambda: _checked(campaign, recordings, model))
+
+
+def _checked(campaign: Campaign, recordings: Sequence[Prepared], model: GravityModel) -> Checked:
+    tared = [
+        tare(campaign, one.entry, relieved(campaign, one.entry, one.run, one.motion), one.motion, model)
+        for one in recordings
+    ]
+    samples = [sample for sample, _ in tared]
+    equation = model.equation
+    low_pass, theta = model.settings.low_pass_Hz, model.fit.value[: equation.size]
+    instants = [prepared(sample, equation, model.settings, low_pass, theta) for sample in samples]
+    constants = np.stack([taring.bias for _, taring in tared])
+    shown = [_read_and_due(one, data, model) for one, data in zip(recordings, instants, strict=True)]
+    readings = [read for read, _, _ in shown]
+    conventions = (*check_weight(campaign.rig), *_conventions(recordings, instants, model, constants, shown))
+    tested = {one.channel for one in conventions if one.testable and one.channel}
+    white = [measured_noise(model.rig, one)[1] for one in recordings]
+    lags = [(one, own) for one, data in zip(recordings, instants, strict=True) if (own := lag(model, data))]
+    late = [_late(campaign, one, own) for one, own in lags if own.taken >= TAKEN]
+    misled = _misread_alone(model, instants, {sample.name for sample, taring in tared if taring.fitted})
+    shows = shown_gains(equation, instants)
+    gains = tuple(_read_gains(equation, {key: of for key, of in shows.items() if key not in tested}))
+    evidence = _Evidence(
+        campaign,
+        model,
+        samples,
+        instants,
+        conventions,
+        _most(equation) if tested else _most_of_untested(equation, readings, white),
+        tension(model, {sample.name: taring for sample, taring in tared}, (*late, *misled, *gains)),
+        late,
+        misled,
+        gains,
+        timed=tuple(mistimed(campaign, recordings)),
+        still=tuple(stuck(recordings, instants, model)),
+        twice=tuple(repeated(recordings)),
+    )
+    reasons = evidence.reasons()
+    told, calibrated = evidence.suggestions(reasons) if reasons else ((), True)
+    soundness = Soundness(
+        sound=not reasons,
+        probability=evidence.tension.probability,
+        gains={key: sigma for key, (_, sigma, _) in shows.items()},
+        beyond=tuple(words.beyond(one, model) for one in evidence.tension.beyond) if reasons else (),
+        reasons=reasons,
+        suggestions=tuple(told),
+        calibrated=calibrated,
+    )
+    judged = {key for one in campaign.requirements for key in measurable.judged_channels(one, campaign.rig)}
+    channels = model.rig.transducer.channels
+    return Checked(
+        soundness,
+        conventions,
+        hidden={one.name: tuple(_hidden(campaign, one, recordings, model)) for one in campaign.requirements},
+        rounding={key: x for one in recordings for key, x in measurable.rounding(campaign, one.readings).items()},
+        noise={
+            one.entry.name: dict(zip(channels, rms.tolist(), strict=True))
+            for one, rms in zip(recordings, white, strict=True)
+        },
+        mute=tuple(key for key in _mute(equation, readings) if key in judged),
+        unconfirmed=tuple(key for key in equation.channels if key not in tested),
+        late={own.recording: abs(own.value) for _, own in lags if abs(own.value) > BEYOND * own.chance},
+    )
 
 
 def _late(campaign: Campaign, one: Prepared, own: Shift) -> Moved:

@@ -12,6 +12,7 @@ from kbs_process.stages.orders.tracking import LEAST, OVER, Track, windows
 _ROWS, _COLUMNS = 24, 160
 _PARTS = 5  # windows of a map in one of the spectrum, where that has few
 _MANY = 12  # windows, from which on the spectrum's own do
+_APART = 1e-9  # of the greatest: rows that are closer are one, of a motion that repeats itself
 _VARIES = 1.5  # greatest rate over the least, from which on a map is over the rate
 
 
@@ -36,6 +37,7 @@ def waterfall(track: Track, loads: Array, length: float, count: int) -> Waterfal
     places = rates if over == "rate" else turns
     rows = max(1, min(_ROWS, len(places) // 2))
     edges = np.unique(np.quantile(places, np.linspace(0.0, 1.0, rows + 1)))
+    edges = edges[np.diff(edges, prepend=-np.inf) > _APART * np.abs(edges).max()]
     if len(edges) < 2:
         edges = places[0] + np.array([-0.5, 0.5]) * max(abs(places[0]), 1.0)
     rows = len(edges) - 1

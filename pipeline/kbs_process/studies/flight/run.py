@@ -42,6 +42,7 @@ def predict_flight(
     progress: Progress,
     pdf: bool | None = None,
     processes: int | None = None,
+    scheduler: str | None = None,
 ) -> Outcome:
     """Fly `samples` units that the parameters' uncertainties allow along a trajectory."""
     if commands is not None:
@@ -54,7 +55,7 @@ def predict_flight(
     base = Job(rig, campaign.effects, given.schedule, duration, campaign.bands.working_rate, judged)
     jobs = [base, *(replace(base, rig=substitute(rig, values(rig, numbers, row))) for row in drawn)]
     with progress.task(f"Flying {samples} units along {given.told}") as task:
-        nominal, *flown = ordered_map(fly, jobs, task.update, processes=processes)
+        nominal, *flown = ordered_map(fly, jobs, task.update, processes=processes, scheduler=scheduler)
     if nominal is None:
         raise SimulationError("the nominal flight unit cannot be simulated", where=campaign.name)
     kept = np.array([unit is not None for unit in flown], dtype=np.bool_)

@@ -37,6 +37,7 @@ def identify(
     progress: Progress,
     pdf: bool | None = None,
     processes: int | None = None,
+    scheduler: str | None = None,
 ) -> Outcome:
     """Identify over the recordings with the role "fit", predict those held out, and write the results to `target`."""
     if campaign.drive == "motion":
@@ -56,7 +57,7 @@ def identify(
         with progress.task(what):
             yield
 
-    with Crew(fitted, processes) as crew:
+    with Crew(fitted, processes, scheduler) as crew:
         evaluate_with = partial(evaluator, crew)
         found = identification.identify(base, evaluate_with, settings, say)
         with progress.task("Profile likelihood"):

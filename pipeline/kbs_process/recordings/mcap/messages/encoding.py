@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -120,8 +119,8 @@ class _CdrLayout:
         return table.view(np.uint8).reshape(n, self.size)
 
 
-def payloads(stream: OutStream) -> Iterator[bytes]:
-    """Yield the payload of every message."""
+def payloads(stream: OutStream) -> NDArray[np.uint8]:
+    """Return the payload (n, size) of every message."""
     layout = _CdrLayout()
     seconds, nanoseconds = np.divmod(stream.stamp, 1_000_000_000)
     layout.number("<i4", seconds)
@@ -139,4 +138,4 @@ def payloads(stream: OutStream) -> Iterator[bytes]:
             layout.number("<f8", column)
         if stream.kind == "temperature":
             layout.number("<f8", 0.0)  # variance: unknown
-    return map(bytes, layout.rows(len(stream.stamp)))
+    return layout.rows(len(stream.stamp))
