@@ -135,7 +135,7 @@ def _peaks(rows: Sequence[Merit], alt: str) -> Picture:
             shown = [row for row in rows if row.unit == name]
             measured = np.array([row.measured_peak for row in shown], dtype=float)
             predicted = np.array([row.predicted_peak for row in shown], dtype=float)
-            low = 0.6 * float(min(measured.min(), predicted.min()))
+            low = 0.3 * float(min(measured.min(), predicted.min()))
             high = 1.6 * float(max(measured.max(), predicted.max()))
             axis.fill_between([low, high], [low, high], [high, high], color="#f4efe6", linewidth=0)
             axis.plot([low, high], [low, high], color=draw.RESIDUAL, linewidth=0.8)
