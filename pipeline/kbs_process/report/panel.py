@@ -85,10 +85,11 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A table's cell with a tone."""
+    """A table's cell with a tone, or a way to another page."""
 
     text: str
     tone: Tone = ""
+    to: str = ""  # another page, relative to this one
 
 
 @dataclass(frozen=True, slots=True)
