@@ -101,7 +101,7 @@ def find_shift(
         spread = 2.0 * share(found) / (max(bend, 1e-300) * len(residual)) * (1.0 + near) / max(1.0 - near, 1e-3)
         return found, float(np.sqrt(spread))
 
-    found, sigma = np.array([least(one) for one in np.flatnonzero(shares[best] < _EXPLAINED)]).T
+    found, sigma = np.array([least(one) for one in np.flatnonzero(shares[best] < _EXPLAINED).tolist()]).T
     weight = 1.0 / np.maximum(sigma, 1e-12) ** 2
     mean = float((weight * found).sum() / weight.sum())
     apart = float((weight * (found - mean) ** 2).sum()) / max(1, len(found) - 1)
