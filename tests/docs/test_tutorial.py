@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from docs.console import Command, agrees, steps
+from kbs_process.report.build import available
 
 ROOT = Path(__file__).parents[2]
 REFUSED = 2
@@ -49,6 +50,8 @@ def test_every_command_prints_what_is_shown(clone: Path) -> None:
         told = f"$ {step.line}\n{done.stdout}{done.stderr}"
         assert done.returncode == (REFUSED if refused else 0), told
         assert agrees(step.shown, printed), f"{told}\nshown:\n{step.shown}"
+    if available():
+        assert (clone / "results" / "arm" / "report.pdf").read_bytes().startswith(b"%PDF")
 
 
 @pytest.mark.parametrize(

@@ -279,6 +279,33 @@ def test_matlab_tables_and_timetables(tmp_path: Path, version: str) -> None:
     assert told(table, "tb.word") and "timeseries" in told(table, "ts") and "x.Time" in told(table, "ts")
 
 
+@pytest.mark.parametrize("uniform", [False, True])
+@pytest.mark.parametrize("along", ["rows", "pages"])
+@pytest.mark.filterwarnings("ignore")
+def test_a_timeseries_is_read_by_its_own_time(tmp_path: Path, uniform: bool, along: str) -> None:
+    """Objects with the properties that MATLAB stores; a uniform time is described, and in no column."""
+    matio = pytest.importorskip("matio")
+    from matio.utils import MatlabOpaque
+
+    data = np.column_stack([3.0 * T, -T])
+    step = 1e3 * (T[1] - T[0])
+    about = {"Start_": [[1e3 * T[0]]], "Increment_": [[step]], "Length": [[len(T)]], "Units": "milliseconds"}
+    properties = {
+        "Data_": data if along == "rows" else data.T[:, None, :],
+        "Time_": np.empty((0, 0)) if uniform else 1e3 * T[:, None],
+        "TimeInfo": MatlabOpaque(
+            properties={key: value if isinstance(value, str) else np.array(value) for key, value in about.items()},
+            classname="tsdata.timemetadata",
+        ),
+    }
+    matio.save_to_mat(tmp_path / "a.mat", {"ts": MatlabOpaque(properties=properties, classname="timeseries")})
+    table = read(tmp_path / "a.mat", "matlab")
+    assert [one.name for one in table.columns] == ["ts.Time", "ts.Data[1]", "ts.Data[2]"]
+    assert {one.clock for one in table.columns[1:]} == {"ts.Time"}
+    np.testing.assert_allclose(cells(table, "ts.Time").astype("i8"), 1e9 * T, atol=1.0)
+    np.testing.assert_array_equal(column(table, "ts.Data[2]"), -T)
+
+
 @pytest.mark.filterwarnings("ignore")
 def test_the_units_of_a_timetable_are_read(tmp_path: Path) -> None:
     matio = pytest.importorskip("matio")

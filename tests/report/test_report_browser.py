@@ -28,6 +28,7 @@ SWITCHES = (
     "--remote-debugging-pipe",
 )
 PREPARED = "document.querySelectorAll('.uplot').length"
+PLOTS = 30  # of six channels: disturbance and static wrench, each with a residual beneath, and spectra
 SPLIT_WORDS = """[...document.querySelectorAll('td')].filter(cell => cell.offsetParent).flatMap(cell => {
   const texts = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT), found = [], range = document.createRange();
   while (texts.nextNode()) for (const word of texts.currentNode.data.matchAll(/[^\\s-]+/g)) {
@@ -167,7 +168,7 @@ def opened(browser: Browser, six_channels: Path) -> Callable[[int], Browser]:
 def test_the_page_renders_without_error_or_overflow(opened: Callable[[int], Browser], width: int) -> None:
     browser = opened(width)
     assert browser.evaluate("document.documentElement.scrollWidth") <= width
-    assert browser.evaluate(PREPARED) == 18
+    assert browser.evaluate(PREPARED) == PLOTS
     assert browser.evaluate(SPLIT_WORDS) == []
     assert browser.evaluate("[...document.images].every(i => i.complete && (i.naturalWidth || !i.offsetParent))")
     assert browser.complaints == []
@@ -177,8 +178,17 @@ def test_one_channel_renders_too(browser: Browser, one_channel: Path) -> None:
     browser.complaints.clear()
     browser.open(one_channel, 800)
     assert browser.evaluate("document.documentElement.scrollWidth") <= 800
-    assert browser.evaluate(PREPARED) == 3
+    assert browser.evaluate(PREPARED) == 5
     assert browser.complaints == []
+
+
+def test_the_residual_has_a_plot_of_its_own_beneath(opened: Callable[[int], Browser]) -> None:
+    browser = opened(1280)
+    labels = (
+        "[...document.querySelector('.live').querySelectorAll('.uplot')].map(plot => "
+        "[...plot.querySelectorAll('.u-series .u-label')].slice(1).map(label => label.textContent))"
+    )
+    assert browser.evaluate(labels) == [["predicted", "measured"], ["residual"]] * 6
 
 
 def test_plots_take_the_place_of_plates_on_screen_and_give_it_back_on_paper(opened: Callable[[int], Browser]) -> None:
@@ -212,7 +222,7 @@ def test_zooming_one_channel_zooms_all_and_another_recording_can_be_chosen(opene
         "s.dispatchEvent(new Event('change')); })()"
     )
     browser.evaluate("new Promise(done => setTimeout(done, 200))")
-    assert browser.evaluate(PREPARED) == 18
+    assert browser.evaluate(PREPARED) == PLOTS
     assert _pixels(browser) != before
     assert browser.complaints == []
 
@@ -231,7 +241,7 @@ def test_plots_are_drawn_anew_in_the_dark(opened: Callable[[int], Browser]) -> N
     browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
     browser.evaluate("new Promise(done => setTimeout(done, 300))")
     assert all(now != then for now, then in zip(_pixels(browser), in_the_light, strict=True))
-    assert browser.evaluate(PREPARED) == 18
+    assert browser.evaluate(PREPARED) == PLOTS
     browser.call("Emulation.setEmulatedMedia", features=[])
     assert browser.complaints == []
 

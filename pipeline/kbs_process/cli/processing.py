@@ -191,17 +191,20 @@ def report(results: Path, pdf: bool | None) -> None:
     say(f"Report: {results / page.name}")
 
 
-@click.command(epilog=examples("compare results/EL089 results/EL089_FM", "compare results/2026-*/EL089"))
+@click.command(epilog=examples("compare results/EL089 results/EL089_FM", "compare results", "compare archive/2026-*"))
 @click.argument("results", nargs=-1, required=True, type=click.Path(path_type=Path))
 @output_option("results/comparison")
 @pdf_option
 def compare(results: tuple[Path, ...], output: Path | None, pdf: bool | None) -> None:
     """Compare RESULTS of several campaigns, tests or versions of a model: requirements, fitted numbers, spectra.
 
-    They are shown in the order of their tests' dates.
+    Of a folder without results, all results of processing below it are taken: an index of an archive. They are shown in
+    the order of their tests' dates, as trends. tables/requirements.parquet and tables/numbers.parquet hold them, too.
     """
     from kbs_process.studies.compare.run import compare as run
+    from kbs_process.studies.compare.run import find
 
-    if len(results) < 2:
-        raise click.UsageError("Give at least two folders of results.")
-    conclude(run(results, output or Path("results/comparison"), pdf))
+    folders = find(results)
+    if len(folders) < 2:
+        raise click.UsageError("Give at least two folders of results, or one that holds them.")
+    conclude(run(folders, output or Path("results/comparison"), pdf))

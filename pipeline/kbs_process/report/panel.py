@@ -85,11 +85,11 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A table's cell with a tone, or a way to another section."""
+    """A table's cell with a tone, or a link."""
 
     text: str
     tone: Tone = ""
-    to: str = ""  # key of that section
+    to: str = ""  # a section, `#key`, or another page, relative to this one
 
 
 @dataclass(frozen=True, slots=True)

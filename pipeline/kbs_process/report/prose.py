@@ -10,7 +10,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from kbs_process.report import text
 from kbs_process.report.panel import Caption
 
-_FORMATS = (text.band_hz, text.count, text.exact, text.frame_label, text.measure, text.number, text.percent, text.unit)
+_FORMATS = (
+    text.band_hz, text.count, text.element, text.exact, text.frame_label, text.measure, text.number, text.percent,
+    text.unit,
+)  # fmt: skip
 _BLANKS = re.compile(r"[ \n]+")  # a space that does not break stays
 
 

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Sequence
+
+from kbs_process.signals.records import WRENCH_CHANNELS
 
 MISSING = "–"
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_TIDY = {"^2": "²", "^3": "³", "*": "·", " ": "\u00a0"}
+_TIDY = {"^2": "²", "^3": "³", "*": "·", "SI by channel pair": "SI", " ": "\u00a0"}
+_TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
+_BY_CHANNEL = ("bias", "noise", "resolution")  # the transducer's: one number a channel
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -53,6 +58,17 @@ def unit(name: str) -> str:
     for plain, tidy in _TIDY.items():
         name = name.replace(plain, tidy)
     return name
+
+
+def element(name: str) -> str:
+    """Return a number's name with the axis or the channels that its index means: body.arm.cog[0] is body.arm.cog x."""
+    if not (found := re.fullmatch(r"(.*\.(\w+))\[(\d)(?:,(\d))?\]", name)):
+        return name
+    stem, key, row, column = found.groups()
+    if column:
+        return f"{stem} {WRENCH_CHANNELS[int(row)]} <- {WRENCH_CHANNELS[int(column)]}"
+    meaning = _TENSOR if key == "inertia" else WRENCH_CHANNELS if key in _BY_CHANNEL else "xyz"
+    return f"{stem} {meaning[int(row)]}"
 
 
 def band_hz(low: float | None, high: float | None) -> str:

@@ -20,7 +20,8 @@ from kbs_process.errors import ConfigError, OutputError, RecordingError
 from kbs_process.recordings.tables import Column
 from kbs_process.results.store import writing
 from kbs_process.studies.convert.begin import begin, check_description
-from kbs_process.studies.convert.mapping_file import Part
+from kbs_process.studies.convert.clock import date_formats, nanoseconds
+from kbs_process.studies.convert.mapping_file import Part, Time
 from kbs_process.studies.convert.naming import by_channel, meaning, runs_of
 from kbs_process.studies.convert.run import _check_same, import_recordings
 from kbs_process.studies.convert.shift import find_shift
@@ -415,3 +416,44 @@ def test_rows_that_only_the_wrench_has_tell_nothing_of_its_clock(tmp_path: Path)
         lines = path.read_text().splitlines()
         path.write_text("\n".join(lines[: 3 + (len(lines) - 3) * 6 // 10]) + "\n")
     assert "are added to the times of wrench" in "\n".join(begin(tmp_path / "arm", files))
+
+
+@pytest.mark.parametrize(
+    ("words", "formats"),
+    [
+        (["2026-03-04T10:17:07Z"], []),
+        (["04.03.2026 10:17:07,300", "04.03.2026 10:17:08,0"], ["%d.%m.%Y %H:%M:%S.%f"]),
+        (["03/04/2026 10:17:07 AM"], ["%d/%m/%Y %I:%M:%S %p", "%m/%d/%Y %I:%M:%S %p"]),
+        (["03/14/2026 10:17"], ["%m/%d/%Y %H:%M"]),
+        (["23:59:59.5"], ["%H:%M:%S.%f"]),
+        (["yesterday"], []),
+    ],
+)
+def test_dates_are_known_by_how_loggers_write_them(words: list[str], formats: list[str]) -> None:
+    assert date_formats(words) == formats
+
+
+@pytest.mark.parametrize(
+    ("word", "how", "seconds"),
+    [
+        ("04.03.2026 10:17:07,300", "%d.%m.%Y %H:%M:%S,%f", 1772619427.3),
+        ("03/04/2026 10:17:07 AM", "%m/%d/%Y %I:%M:%S %p", 1772619427.0),
+        ("10:17:07,300", "%H:%M:%S,%f", 37027.3),  # a time of day counts from `start`, or from 1970
+    ],
+)
+def test_dates_are_read_by_their_format(word: str, how: str, seconds: float) -> None:
+    ns, known = nanoseconds(np.array([word]), Time.model_construct(unit="datetime", format=how), "a.csv")
+    assert known.all() and ns[0] == round(seconds * 1000) * 1_000_000
+    with pytest.raises(RecordingError, match="is no format of dates"):
+        nanoseconds(np.array([word]), Time.model_construct(unit="datetime", format="%Q"), "a.csv")
+
+
+def test_dates_of_a_logger_become_a_format_in_the_mapping(tmp_path: Path) -> None:
+    rows = "".join(f"04.13.2026 10:17:{k // 10:02},{k % 10};{k},5\n" for k in range(50))
+    told = []
+    for name, text in (("us", rows), ("de", rows.replace("04.13.", "13.04."))):
+        (tmp_path / f"{name}.csv").write_text("Zeit;Fx (N)\n" + text)
+        told += begin(tmp_path / name, [tmp_path / f"{name}.csv"])
+    assert 'format = "%d.%m.%Y %H:%M:%S.%f"' in (tmp_path / "de" / "mapping.toml").read_text()
+    assert any(line.startswith("de.csv, 10 Hz") for line in told)
+    assert 'unit = "?"  # of the times' in (tmp_path / "us" / "mapping.toml").read_text()  # no such format is usual

@@ -2,8 +2,8 @@
 
 Of an array of structures a field is a column where all have one number in it, else "name(1).field" and so on.
 
-Since MATLAB 7.3 a file is one of HDF5. Tables and timetables are objects, which the package mat-io decodes: variables
-"name.variable", row times "name.Time".
+Since MATLAB 7.3 a file is one of HDF5. Tables, timetables and timeseries are objects, which the package mat-io decodes:
+variables "name.variable", row times "name.Time", a timeseries' data "name.Data".
 """
 
 from __future__ import annotations
@@ -29,6 +29,14 @@ _MATLAB_HEADER = 512  # bytes that MATLAB writes before the HDF5 file
 _DEPTH = 8  # of structures within structures
 _NAMELESS = "None"
 _OBJECT = re.compile(r": (it is an? (?:object|table|timetable|datetime|duration|timeseries)): ")
+_UNITS = {
+    "seconds": 1e9,
+    "milliseconds": 1e6,
+    "microseconds": 1e3,
+    "nanoseconds": 1.0,
+    "minutes": 6e10,
+    "hours": 3.6e12,
+}
 _REMEDY = "export its numbers with s.t = x.Time; s.x = x.Data, or table2struct; tables need 'kbs-process[formats]'"
 
 
@@ -127,7 +135,7 @@ def _decoded(data: Any, name: str, depth: int) -> Iterator[Item]:
             for one in series_of(_seconds(values) if lasts else values, f"{name}.{label}", "s" if lasts else unit):
                 yield replace(one, column=replace(one.column, clock=clock)) if isinstance(one, Series) else one
     elif isinstance(data, MatlabOpaque):
-        yield f"{name}: it is a {data.classname}: {_REMEDY}"
+        yield from _timeseries(data.properties, name) or [f"{name}: it is a {data.classname}: {_REMEDY}"]
     elif isinstance(data, np.ndarray) and data.dtype.names and data.size == 1 and depth:
         for field in data.dtype.names:
             yield from _decoded(data.flat[0][field], f"{name}.{field}", depth - 1)
@@ -137,6 +145,31 @@ def _decoded(data: Any, name: str, depth: int) -> Iterator[Item]:
         yield from series_of(_seconds(data), name, "s")
     elif data.dtype.kind not in "iufbc":
         yield f"{name}: it is text, or an array of cells, structures or objects: save each field as numbers"
+
+
+def _timeseries(properties: Any, name: str) -> list[Item]:
+    """Return the columns of a timeseries by its own time; none of another object, or where rows and times do not agree.
+
+    Times are in one property, or, where they are uniform, in that which describes them.
+    """
+    values, own = (np.asarray(properties.get(key, ())) for key in ("Data_", "Time_"))
+    described = (getattr(one, "properties", None) for one in properties.values())
+    about: Any = next((one for one in described if one and "Increment_" in one), {})
+    unit = _UNITS.get("".join(np.ravel(about.get("Units", "seconds")).astype(str)))
+    if not own.size and about:
+        start, step, length = (float(np.ravel(about[key])[0]) for key in ("Start_", "Increment_", "Length"))
+        own = start + step * np.arange(int(length))
+    rows = own.size
+    if unit is None or not rows or rows not in (values.shape[0], values.shape[-1]) or own.dtype.kind not in "iuf":
+        return []
+    first = values if values.shape[0] == rows else np.moveaxis(values, -1, 0)
+    clock = f"{name}.Time"
+    times = np.datetime64(0, "ns") + np.rint(own.ravel() * unit).astype("m8[ns]")
+    columns = series_of(first.reshape(rows, -1), f"{name}.Data")
+    return [
+        *series_of(times, clock, "datetime"),
+        *(replace(one, column=replace(one.column, clock=clock)) if isinstance(one, Series) else one for one in columns),
+    ]
 
 
 def _seconds(durations: Any) -> Any:

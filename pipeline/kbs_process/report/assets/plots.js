@@ -136,10 +136,7 @@
         return;
       }
       const between = (values) => (values[index] === null || values[mark] === null ? null : values[index] - values[mark]);
-      const parts = plots.map((plot, i) => {
-        const channel = view.channels[i];
-        return `Δ${channel.name} ${shown(between(plot.data[plot.measured]))} ${tidy(channel.unit)}`;
-      });
+      const parts = plots.filter((plot) => plot.measured).map((plot) => `Δ${plot.channel.name} ${shown(between(plot.data[plot.measured]))} ${tidy(plot.channel.unit)}`);
       reading.textContent = [`From the mark: Δ${symbol} ${shown(between(plots[0].data[0]))} ${unit}`, ...parts].join("  ·  ");
     };
 
@@ -164,52 +161,75 @@
       });
     };
 
+    // Least and greatest of curves between two points.
+    const extent = (curves, [from, to]) => curves.reduce(([low, high], curve) => {
+      for (let i = from; i <= to; i++) {
+        if (curve[i] === null) continue;
+        if (curve[i] < low) low = curve[i];
+        if (curve[i] > high) high = curve[i];
+      }
+      return [low, high];
+    }, [Infinity, -Infinity]);
+
+    // The plots of a channel: the residual has one of its own beneath the others, so that it hides nothing.
     const make = (channel, t, last) => {
+      const all = curvesOf(channel, Boolean(view.places));
       const place = (i) => LOWEST_FIRST.indexOf(names[i]);
       const order = [...channel.curves.keys()].sort((i, j) => place(i) - place(j));
+      const above = order.filter((i) => names[i] !== "residual");
+      const beneath = order.filter((i) => names[i] === "residual");
+      const [low, high] = extent(above.map((i) => all[i]), [0, t.length - 1]);
+      const limit = channel.limit !== null && Math.max(-low, high) > 0.25 * channel.limit ? channel.limit : null;
+      const groups = beneath.length ? [above, beneath] : [above];
+      return groups.map((group) => panel(channel, t, group, all, {
+        limit: group === above ? limit : null,
+        shares: group === beneath && !twoScales ? order : null,
+        ends: group === groups.at(-1),
+        last,
+      }));
+    };
+
+    // One plot; it has the scale of the curves `shares`, if there are any.
+    const panel = (channel, t, group, all, { limit, shares, ends, last }) => {
       const logarithmic = Boolean(view.places);
-      const all = curvesOf(channel, logarithmic);
-      const curves = order.map((i) => all[i]);
-      const apart = twoScales && channel.curves.length === 3;
-      const peak = Math.max(...curves.map((curve) => curve.reduce((most, v) => Math.max(most, Math.abs(v)), 0)));
-      const highest = curves.at(-1).reduce((most, v) => Math.max(most, v), 0); // of the residual
-      const limit = channel.limit !== null && peak > 0.25 * channel.limit ? channel.limit : null;
-      // Room below and above the curves, in parts of their range: a residual apart runs beneath the others.
-      const range = (below, above) => (_, low, high) => {
-        const [bottom, top] = limit === null ? [low, high] : [Math.min(low, -limit), Math.max(high, limit)];
-        const span = top - bottom || Math.abs(top) || 1;
-        return [bottom - below * span, top + above * span];
+      const range = (plot, low, high) => {
+        const [least, most] = shares ? extent(shares.map((i) => all[i]), plot.series[0].idxs) : [low, high];
+        const [bottom, top] = limit === null ? [least, most] : [Math.min(least, -limit), Math.max(most, limit)];
+        const room = 0.06 * (top - bottom || Math.abs(top) || 1);
+        return [bottom - room, top + room];
       };
       const log = logarithmic ? { distr: 3 } : {};
       const decades = (_, low, high) => (low > 0 ? [low / 2, high * 2] : [1, 10]); // of a plot that shows no point
       const ticks = logarithmic ? { splits: (_, __, low, high) => rounds(low, high), filter: (_, splits) => splits, values: (_, splits) => splits.map(power) } : {};
       const axis = { ...ticks, grid: { stroke: color("faint"), width: 1 }, font: "11px sans-serif", labelFont: "12px sans-serif", labelSize: 20, stroke: color("ink"), ticks: { stroke: color("rule"), width: 1 } };
+      const residual = names[group[0]] === "residual";
+      const height = (residual ? 70 : view.channels.length === 1 ? 270 : 112) + (ends ? (last ? 64 : 34) : 0);
       const plot = new uPlot({
+        class: residual ? "beneath" : "above",
         width: box.clientWidth,
-        height: view.channels.length === 1 ? 300 : last ? 176 : 146,
+        height,
         cursor: { sync: { key, setSeries: false }, drag: { x: true, y: false, dist: 4 }, points: { size: 5 } },
-        scales: { x: { time: false, ...log, range: (_, low, high) => [low, high] }, y: { ...log, range: logarithmic ? decades : apart ? range(0.8, 0.06) : range(0.06, 0.06) }, r: { range: range(0.06, 2) } },
+        scales: { x: { time: false, ...log, range: (_, low, high) => [low, high] }, y: { ...log, range: logarithmic ? decades : range } },
         series: [
           { label: `${symbol} / ${unit}`, value: (_, v) => (logarithmic || v === null ? shown(v) : v.toFixed(2)) },
-          ...order.map((i) => ({
+          ...group.map((i) => ({
             stroke: color(LOOKS[names[i]].color),
             width: LOOKS[names[i]].width,
             dash: LOOKS[names[i]].dash,
             spanGaps: logarithmic,
             label: names[i],
-            scale: apart && i === 2 ? "r" : "y",
             points: { show: false },
             value: (_, v) => shown(v),
           })),
         ],
         axes: [
-          { ...axis, label: last ? `${along} / ${unit}` : undefined, size: last ? 34 : 24 },
-          { ...axis, label: `${channel.name} / ${tidy(channel.unit)}`, size: 62 },
-          ...(apart ? [{ ...axis, scale: "r", side: 1, label: "residual", size: 62, grid: { show: false }, stroke: color("residual"), filter: (_, splits) => splits.map((v) => (v > highest ? null : v)) }] : []),
+          { ...axis, label: ends && last ? `${along} / ${unit}` : undefined, size: !ends ? 6 : last ? 34 : 24, ...(ends ? {} : { values: () => [], ticks: { show: false } }) },
+          { ...axis, label: residual ? "residual" : `${channel.name} / ${tidy(channel.unit)}`, size: 62, ...(residual ? { space: 24 } : {}) },
         ],
         hooks: { drawClear: [under], draw: [(plot) => over(plot, limit)], setCursor: [(plot) => read(plot.cursor.idx)] },
-      }, [t, ...curves], box);
-      plot.measured = 1 + order.indexOf(0);
+      }, [t, ...group.map((i) => all[i])], box);
+      plot.channel = channel;
+      plot.measured = 1 + group.findIndex((i) => names[i] === "measured");
       wheel(plot);
       return plot;
     };
@@ -228,7 +248,7 @@
       }
       const t = view.places ? powers(view.places) : unpack(view.channels[0].curves[0]).map((_, i) => view.t0 + i * view.step);
       if (view.bin_s !== null) notes.textContent = `Each pair of points is the least and greatest value in ${view.bin_s.toPrecision(3)} s.`;
-      plots = view.channels.map((channel, i) => make(channel, t, i === view.channels.length - 1));
+      plots = view.channels.flatMap((channel, i) => make(channel, t, i === view.channels.length - 1));
     };
 
     const recordings = chooser("Recording", unique("recording"), show);

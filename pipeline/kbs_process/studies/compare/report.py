@@ -6,6 +6,7 @@ from kbs_process.report import provenance
 from kbs_process.report.document import Document
 from kbs_process.report.panel import Head
 from kbs_process.report.text import count
+from kbs_process.studies.compare.axis import FEW
 from kbs_process.studies.compare.results import ComparisonResults
 from kbs_process.studies.compare.sections import numbers, requirements, spectra, verdicts
 
@@ -13,10 +14,11 @@ from kbs_process.studies.compare.sections import numbers, requirements, spectra,
 def head(results: ComparisonResults) -> Head:
     """What was compared, and what differs."""
     names = list(dict.fromkeys(one.name for one in results.compared))
+    name = ", ".join(names) if len(names) <= FEW else f"{names[0]} … {names[-1]}"
     about = " · ".join(dict.fromkeys(one.article for one in results.compared if one.article))
     title = count(len(results.compared), "folder of results", "folders of results")
     made = results.provenance.version
-    return Head("Comparison", ", ".join(names), title, about, results.verdict, made, headline="Compared")
+    return Head("Comparison", name, title, about, results.verdict, made, headline="Compared")
 
 
 DOCUMENT = Document(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import comb
+from statistics import NormalDist
 from typing import Literal
 
 from kbs_process.results.judged import Frame, Statistic, Verdict
@@ -18,11 +20,15 @@ class Compared(Record, frozen=True, kw_only=True):
     name: str
     title: str
     article: str
+    number: str = ""  # of the document
+    revision: str = ""
     date: str  # of the test
     made_by: str  # version and commit of the program
     status: Status
     sentence: str
     model: str  # correlated, not correlated, not testable; "" where nothing was predicted
+    chi_square: float | None = None  # of a degree of freedom: what gravity leaves over what its uncertainty explains
+    page: str = ""  # of its report, relative to that of the comparison
 
 
 class Judged(Record, frozen=True, kw_only=True):
@@ -39,6 +45,7 @@ class Judged(Record, frozen=True, kw_only=True):
     low: tuple[float | None, ...]  # the true value lies between low and high, at 95 %
     high: tuple[float | None, ...]
     predicted: tuple[float | None, ...]
+    residual: tuple[float | None, ...]  # rms of measured less predicted, of that channel in that recording
     channel: tuple[str | None, ...]  # that decides, and
     recording: tuple[str | None, ...]
 
@@ -51,6 +58,13 @@ class Number(Record, frozen=True, kw_only=True):
     value: tuple[float | None, ...]
     sigma: tuple[float | None, ...]
     distance: float | None  # of the two that differ most, in standard deviations of such differences
+    determined: bool  # whether recordings say more of it than the parameter files, in one of the results
+
+
+def far(results: int) -> float:
+    """How many standard deviations the greatest difference exceeds as rarely as that of two results exceeds FAR."""
+    normal = NormalDist()
+    return -normal.inv_cdf(normal.cdf(-FAR) / comb(results, 2))
 
 
 class ComparisonResults(ResultsFile, frozen=True, kw_only=True):

@@ -1,15 +1,18 @@
-"""Read several folders of results, and lay side by side what they judge and what they fitted."""
+"""Read folders of results, however many, and lay side by side what they judge and what they fitted."""
 
 from __future__ import annotations
 
+import os
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import TypeVar
 
 import msgspec
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from kbs_process.errors import OutputError
 from kbs_process.report.build import publish
@@ -22,9 +25,11 @@ from kbs_process.results.records import FILE, Conclusion, Provenance, kind_of, l
 from kbs_process.results.store import check_unchanged, writing
 from kbs_process.results.tables import read_columns, write_table
 from kbs_process.signals.records import Array
-from kbs_process.studies.compare.results import FAR, Compared, ComparisonResults, Judged, Number
+from kbs_process.studies.compare.results import Compared, ComparisonResults, Judged, Number, far
 
 SPECTRA = "spectra"  # tables of the deciding channel's density, by the place of the results
+SPECTRA_OF = 8  # results, the last ones
+_BEYOND_PRIOR = 0.9  # of a prior's sigma, below which recordings say something of a number
 _SAYS = Prose("kbs_process.studies.compare", "answer")
 _V = TypeVar("_V")
 
@@ -35,7 +40,9 @@ class _Campaign(msgspec.Struct, frozen=True):
     article: str
 
 
-class _Dated(msgspec.Struct, frozen=True):
+class _Document(msgspec.Struct, frozen=True):
+    number: str = ""
+    revision: str = ""
     date: str = ""
 
 
@@ -44,10 +51,20 @@ class _Fitted(msgspec.Struct, frozen=True):
     unit: str
     value: float
     sigma: float
+    prior_sigma: float | None = None
 
 
 class _Gravity(msgspec.Struct, frozen=True):
     parameters: tuple[_Fitted, ...] = ()
+    reduced_chi_square: float | None = None
+
+
+class _Merit(msgspec.Struct, frozen=True):
+    recording: str
+    channel: str
+    band: str
+    frame: str
+    residual_rms: float | None = None
 
 
 class _Model(msgspec.Struct, frozen=True):
@@ -60,10 +77,33 @@ class _Processed(msgspec.Struct, frozen=True):
     campaign: _Campaign
     verdict: Conclusion
     provenance: Provenance
-    document: _Dated = _Dated()
+    document: _Document = _Document()
     model: _Model | None = None
     requirements: tuple[Requirement, ...] = ()
     gravity: _Gravity | None = None
+    merit: tuple[_Merit, ...] = ()
+
+
+def find(folders: Iterable[Path]) -> list[Path]:
+    """Return folders of results: those given, and of those that have none, all of processing below them."""
+    found: list[Path] = []
+    for folder in folders:
+        below = [folder] if (folder / FILE).exists() else sorted(filter(_is_of_processing, _below(folder)))
+        if not below:
+            raise OutputError("no results here, or below", where=str(folder), remedy="kbs-process CAMPAIGN makes them")
+        found += below
+    return list(dict.fromkeys(found))
+
+
+def _below(folder: Path) -> list[Path]:
+    return [Path(root) for root, _, files in os.walk(folder) if FILE in files]
+
+
+def _is_of_processing(folder: Path) -> bool:
+    try:
+        return kind_of(folder) == "correlation"
+    except OutputError:  # another program's
+        return False
 
 
 def compare(folders: Sequence[Path], target: Path, pdf: bool | None = None) -> Outcome:
@@ -75,9 +115,9 @@ def compare(folders: Sequence[Path], target: Path, pdf: bool | None = None) -> O
     )
     requirements = tuple(_requirements([results for _, results in read]))
     numbers = tuple(sorted(_numbers([results for _, results in read]), key=lambda one: -(one.distance or 0.0)))
-    compared = tuple(_compared(_mark(place), folder, results) for place, (folder, results) in enumerate(read))
-    apart = [one for one in numbers if one.distance is not None and one.distance > FAR]
-    told = _SAYS("answer", count=len(read), requirements=requirements, apart=apart, far=FAR)
+    compared = tuple(_compared(_mark(place), folder, results, target) for place, (folder, results) in enumerate(read))
+    apart = [one for one in numbers if one.distance is not None and one.distance > far(len(read))]
+    told = _SAYS("answer", count=len(read), requirements=requirements, apart=apart, far=far(len(read)))
     results = ComparisonResults(
         verdict=Conclusion(status="none", sentence=told),
         provenance=_made(folders),
@@ -87,6 +127,7 @@ def compare(folders: Sequence[Path], target: Path, pdf: bool | None = None) -> O
     )
     with writing(target) as folder:
         _keep_spectra(read, requirements, folder)
+        _keep_trends(results, folder)
         from kbs_process.studies.compare.report import DOCUMENT  # draws: takes its time to import
 
         return publish(folder, target, results, DOCUMENT, pdf)
@@ -108,18 +149,23 @@ def _mark(place: int) -> str:
     return chr(ord("A") + place % 26) + ("" if place < 26 else str(place // 26 + 1))
 
 
-def _compared(mark: str, folder: Path, results: _Processed) -> Compared:
+def _compared(mark: str, folder: Path, results: _Processed, target: Path) -> Compared:
+    page = folder / "index.html"
     return Compared(
         mark=mark,
         folder=str(folder),
         name=results.campaign.name,
         title=results.campaign.title,
         article=results.campaign.article,
+        number=results.document.number,
+        revision=results.document.revision,
         date=results.document.date,
         made_by=maker(results.provenance),
         status=results.verdict.status,
         sentence=results.verdict.sentence,
         model=results.model.status if results.model else "",
+        chi_square=results.gravity.reduced_chi_square if results.gravity else None,
+        page=Path(os.path.relpath(page, target)).as_posix() if page.is_file() else "",
     )
 
 
@@ -130,10 +176,10 @@ def _requirements(read: Sequence[_Processed]) -> list[Judged]:
         for one in results.requirements:
             same = (one.name, one.statistic, one.frame, one.band_Hz, one.limit, one.unit)
             found.setdefault(same, [None] * len(read))[place] = one
-    return [_judged(own) for own in found.values()]
+    return [_judged(own, [results.merit for results in read]) for own in found.values()]
 
 
-def _judged(own: Sequence[Requirement | None]) -> Judged:
+def _judged(own: Sequence[Requirement | None], merits: Sequence[Sequence[_Merit]]) -> Judged:
     first = next(one for one in own if one is not None)
 
     def each(of: Callable[[Requirement], _V]) -> tuple[_V | None, ...]:
@@ -151,9 +197,17 @@ def _judged(own: Sequence[Requirement | None]) -> Judged:
         low=each(lambda one: one.low),
         high=each(lambda one: one.high),
         predicted=each(lambda one: one.predicted_value),
+        residual=tuple(None if one is None else _left(one, merit) for one, merit in zip(own, merits, strict=True)),
         channel=each(lambda one: one.channel),
         recording=each(lambda one: one.recording),
     )
+
+
+def _left(one: Requirement, merits: Sequence[_Merit]) -> float | None:
+    """What the prediction leaves of the channel that decides."""
+    decides = (one.recording, one.channel, one.band, one.frame)
+    own = (m.residual_rms for m in merits if (m.recording, m.channel, m.band, m.frame) == decides)
+    return next(own, None)
 
 
 def _numbers(read: Sequence[_Processed]) -> list[Number]:
@@ -168,9 +222,14 @@ def _numbers(read: Sequence[_Processed]) -> list[Number]:
             value=tuple(None if one is None else one.value for one in own),
             sigma=tuple(None if one is None else one.sigma for one in own),
             distance=_distance([one for one in own if one is not None]),
+            determined=any(one and _says_more(one) for one in own),
         )
         for (name, unit), own in found.items()
     ]
+
+
+def _says_more(one: _Fitted) -> bool:
+    return one.prior_sigma is None or one.sigma < _BEYOND_PRIOR * one.prior_sigma
 
 
 def _distance(own: Sequence[_Fitted]) -> float | None:
@@ -188,7 +247,7 @@ def _distance(own: Sequence[_Fitted]) -> float | None:
 
 def _keep_spectra(read: Sequence[tuple[Path, _Processed]], requirements: Sequence[Judged], folder: Path) -> None:
     """Of each requirement, the measured and predicted density of the channel that decides, by results."""
-    for place, (source, results) in enumerate(read):
+    for place, (source, results) in list(enumerate(read))[-SPECTRA_OF:]:
         columns: dict[str, Array] = {}
         units: dict[str, str] = {}
         for number, one in enumerate(requirements):
@@ -206,6 +265,33 @@ def _keep_spectra(read: Sequence[tuple[Path, _Processed]], requirements: Sequenc
         if columns:
             path = folder / "tables" / SPECTRA / f"{place}.parquet"
             write_table(path, columns, units, frame="T", recording=results.campaign.name)
+
+
+def _keep_trends(results: ComparisonResults, folder: Path) -> None:
+    """One table of all requirements and one of all numbers, a row for each in each of the results."""
+    about = [
+        {"campaign": one.name, "date": one.date, "number": one.number, "revision": one.revision, "folder": one.folder}
+        for one in results.compared
+    ]
+    judged = ("verdict", "value", "low", "high", "predicted", "residual", "channel", "recording")
+    tables: dict[str, tuple[tuple[Judged, ...] | tuple[Number, ...], tuple[str, ...], tuple[str, ...]]] = {
+        "requirements": (results.requirements, ("name", "statistic", "frame", "band_Hz", "limit", "unit"), judged),
+        "numbers": (results.numbers, ("name", "unit"), ("value", "sigma")),
+    }
+    for name, (entries, same, each) in tables.items():
+        rows = [
+            where
+            | {"model": compared.model}
+            | {field: getattr(one, field) for field in same}
+            | {field: getattr(one, field)[place] for field in each}
+            for one in entries
+            for place, (where, compared) in enumerate(zip(about, results.compared, strict=True))
+            if one.value[place] is not None
+        ]
+        if rows:
+            path = folder / "tables" / f"{name}.parquet"
+            path.parent.mkdir(exist_ok=True)
+            pq.write_table(pa.Table.from_pylist(rows), path, compression="zstd")
 
 
 def _made(folders: Sequence[Path]) -> Provenance:

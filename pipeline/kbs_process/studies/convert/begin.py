@@ -24,7 +24,7 @@ from kbs_process.recordings.open_table import open_table
 from kbs_process.recordings.tables import Table
 from kbs_process.results.store import writing
 from kbs_process.signals.records import WRENCH_CHANNELS, Array
-from kbs_process.studies.convert.clock import nanoseconds, numbers
+from kbs_process.studies.convert.clock import date_formats, nanoseconds, numbers
 from kbs_process.studies.convert.description import prepare
 from kbs_process.studies.convert.mapping import load_mapping
 from kbs_process.studies.convert.mapping_file import Time
@@ -35,10 +35,12 @@ from kbs_process.studies.convert.shift import find_shift
 MAPPING_FILE = "mapping.toml"
 _PREAMBLE = 40  # lines above a table that are looked through
 _YEAR_NS = 31_536_000 * 10**9  # a file's own times within a year of 1970 count from the file's begin
+_OSCILLATOR = 3e-4  # by which two clocks' rates may differ; less is part of the shift's sigma
 _APART = 5.0  # sigmas: clocks whose shift changes by more from half to half run at different rates
 _ENCODINGS = (Text().encoding, "cp1252")  # the latter is what Windows writes in Western Europe
 _MOST = 1e100  # a greater number is no reading
 _KEPT = 4096  # rows of a piece that are kept, as averages
+_WORDS = 200  # dates, by which their format is known
 _RATES = [digit * 10.0**power for power in range(-2, 6) for digit in (1, 2, 5)]
 
 
@@ -51,6 +53,7 @@ class Log:
     columns: list[Meaning]
     section: int | None = None  # of a text that has several
     dated: bool = False
+    formats: list[str] = field(default_factory=list)  # of its dates: one, or several that may be meant
     clocked: bool = False  # by the file itself
     times: dict[str, list[Array]] = field(default_factory=dict)  # by stream
     values: dict[str, list[Array]] = field(default_factory=dict)  # by column, as the file has them, averaged with times
@@ -231,11 +234,20 @@ def _seconds(log: Log, named: dict[str, Any], clock: str, stamp: list[Meaning], 
     cells, unit = named[clock or stamp[0].column][:rows], "s" if clock else stamp[0].unit
     if not clock:
         if cells.dtype.kind == "M" or (cells.dtype.kind not in "iuf" and not np.isfinite(numbers(cells[:10])).any()):
-            unit, log.dated = "datetime", True
+            words = (
+                [str(one).strip() for one in cells[:: max(1, len(cells) // _WORDS)].tolist()]
+                if cells.dtype.kind != "M"
+                else []
+            )
+            unit, log.dated, log.formats = "datetime", True, log.formats or date_formats(words)
             log.columns = [Meaning(one.column, "time", unit=unit) if one == stamp[0] else one for one in log.columns]
         if unit not in ("s", "ms", "us", "ns", "min", "datetime"):
             return None
-    ns, known = nanoseconds(cells, Time.model_construct(unit=unit), str(log.path))
+    time = Time.model_construct(unit=unit, format=next(iter(log.formats), None))
+    ns, known = nanoseconds(cells, time, str(log.path))
+    if not known.any():
+        log.columns = [Meaning(one.column, "time") if one.stream == "time" else one for one in log.columns]
+        return None
     least = _YEAR_NS if clock else 10**18  # a number of a column may be large
     log.dated = log.dated or bool(known.any() and ns[known].min() > least)  # counted from 1970
     return np.where(known, ns * 1e-9, np.nan)
@@ -309,8 +321,15 @@ def _clock(log: Log) -> str:
         return "# the file has its own"
     if stamp := log.of("time"):
         unit = quoted(stamp[0].unit) + ("  # of the times" if stamp[0].unit == QUESTION else "")
-        return f"column = {quoted(stamp[0].column)}\nunit = {unit}"
+        return "\n".join([f"column = {quoted(stamp[0].column)}", f"unit = {unit}", *_format(log)])
     return 'rate_Hz = "?"  # rows a second: no column is known for a time'
+
+
+def _format(log: Log) -> list[str]:
+    """Return the key that says how dates are written, a question where day and month may be either way."""
+    if len(log.formats) > 1:
+        return [f'format = "?"  # day or month first? {" or ".join(map(quoted, log.formats))}']
+    return [f"format = {quoted(one)}" for one in log.formats]
 
 
 def _text(log: Log) -> list[str]:
@@ -358,7 +377,10 @@ def _shift(load: Log, angle: Log) -> tuple[str, str]:
             halves = [both[: len(both) // 2], both[len(both) // 2 :]]
         parts = [one for half in halves if (one := find_shift(t[half], wrench[half], t_angle, q, turns))]
         for one, other in combinations([found, *parts] if found else [], 2):
-            if abs(one[0] - other[0]) > _APART * np.hypot(one[1], other[1]):
+            by = abs(one[0] - other[0])
+            if found and by <= _OSCILLATOR * np.ptp(t) / 2.0:  # what is between two halves
+                found = found[0], max(found[1], by / 2.0)
+            elif by > _APART * np.hypot(one[1], other[1]):
                 found, asked = None, f"it is {one[0]:.4f} s in one part, {other[0]:.4f} s in another"
     if found is None:
         told = f"how their clocks stand to each other is not known: {asked}"

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,15 @@ from kbs_process.signals.records import Array, Mask, Stamps
 from kbs_process.studies.convert.mapping_file import Time
 
 _NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "ns": 1, "min": 60_000_000_000}
+_DAYS = ("%d.%m.%Y", "%d.%m.%y", "%d/%m/%Y", "%m/%d/%Y", "%d/%m/%y", "%m/%d/%y", "%d-%m-%Y", "%m-%d-%Y", "%Y/%m/%d")
+_PARTS = ("", ".%f", ":%f")  # of a second; a comma is read as a point
+_HOURS = ("%H:%M:%S", "%I:%M:%S", "%H:%M")
+_FORMATS = [
+    day + between + hour + part + half
+    for day, between, hour, part, half in product(
+        (*_DAYS, "%d %b %Y", "%d-%b-%Y", "%d-%b-%y"), (" ", ". ", ";", "T"), _HOURS, _PARTS, ("", " %p")
+    )
+] + [hour + part + half for hour, part, half in product(_HOURS, _PARTS, ("", " %p"))]  # fmt: skip
 _GREATEST = 2.0**63 - 1024.0  # ns, the greatest double that an int64 holds
 
 
@@ -39,7 +50,7 @@ def nanoseconds(cells: Cells, time: Time, where: str) -> tuple[Stamps, Mask]:
     if cells.dtype.kind == "M":
         return _from_dates(cells)
     if time.unit == "datetime":
-        return _from_texts(cells, where)
+        return _from_texts(cells, time, where)
     start = epoch_ns(time.start)
     if why := too_coarse(cells, 1e-9 * _NS[time.unit] if time.rate_Hz is None else 1.0 / time.rate_Hz):
         remedy = "give rate_Hz in the mapping's [time], or record times as 64 bits"
@@ -51,6 +62,21 @@ def nanoseconds(cells: Cells, time: Time, where: str) -> tuple[Stamps, Mask]:
         return cells.astype(np.int64) * scale + start, np.ones(len(cells), dtype=np.bool_)
     with np.errstate(over="ignore"):  # infinity is no time either
         return _rounded(numbers(cells) * scale, start)
+
+
+def date_formats(words: Sequence[str]) -> list[str]:
+    """Return in which usual formats all words are dates and times, or times of day; none where they are ISO 8601."""
+    found = _FORMATS if words and not _reads(words[0], None) else []
+    for word in (word.replace(",", ".") for word in words):
+        found = [one for one in found if ("%I" in one) == ("%p" in one) and _reads(word, one)]
+    return found
+
+
+def _reads(word: str, how: str | None) -> bool:
+    try:
+        return bool(datetime.fromisoformat(word) if how is None else datetime.strptime(word, how))
+    except ValueError:
+        return False
 
 
 def epoch_ns(start: datetime | None) -> int:
@@ -69,12 +95,21 @@ def _from_dates(cells: NDArray[Any]) -> tuple[Stamps, Mask]:
     return cells.astype("datetime64[ns]").astype(np.int64), ~np.isnat(cells)
 
 
-def _from_texts(cells: Cells, where: str) -> tuple[Stamps, Mask]:
+def _from_texts(cells: Cells, time: Time, where: str) -> tuple[Stamps, Mask]:
     import pandas as pd
 
     if cells.dtype.kind in "iuf":
         raise RecordingError(
             "holds numbers, not dates", where=where, remedy='give their unit, such as unit = "s", in [time]'
         )
-    dates = pd.to_datetime(pd.Series(cells, dtype="str"), utc=True, format="ISO8601", errors="coerce")
-    return _from_dates(dates.dt.tz_localize(None).to_numpy(dtype="datetime64[ns]"))
+    how = (time.format or "ISO8601").replace(",", ".")
+    words = pd.Series(cells, dtype="str").str.strip().str.replace(",", ".")
+    try:
+        dates = pd.to_datetime(words, utc=True, format=how, errors="coerce")
+    except ValueError as error:
+        remedy = 'write it as Python does, such as "%d.%m.%Y %H:%M:%S,%f"'
+        raise RecordingError(f"'{how}' is no format of dates: {error}", where=where, remedy=remedy) from None
+    stamps, known = _from_dates(dates.dt.tz_localize(None).to_numpy(dtype="datetime64[ns]"))
+    if time.format and "%d" not in time.format:  # a time of day, which Python takes to be in 1900
+        stamps = stamps + (epoch_ns(time.start) - epoch_ns(datetime(1900, 1, 1, tzinfo=UTC)))
+    return stamps, known

@@ -68,6 +68,9 @@ class Time(Table):
 
     column: Which | None = Field(None, description="a column's name, or its number counted from 1")
     unit: Literal["s", "ms", "us", "ns", "min", "datetime"] = "s"
+    format: Words | None = Field(
+        None, description='of dates that are not ISO 8601, as Python writes it: "%d.%m.%Y %H:%M:%S,%f"'
+    )
     rate_Hz: Positive | None = Field(
         None, description="sampling rate, Hz: the column counts samples, or, without a column, so do the rows"
     )

@@ -7,6 +7,7 @@ from itertools import chain
 
 import numpy as np
 from scipy.optimize import minimize_scalar
+from scipy.signal import savgol_filter
 
 from kbs_process.signals.records import Array, Mask
 
@@ -16,6 +17,7 @@ _EXPLAINED = 0.05  # share of a channel that may be left, or angles do not tell 
 _FEWEST = 30  # rows with a partner, fewer of which any curve fits
 _BRIDGED = 10.0  # times their usual interval, or change: angles that are farther apart tell nothing of what is between
 _PIECE = 0.1  # of all rows, fewer of which between two leaps are no motion
+_BEND = 11  # points, over which an acceleration is fitted
 _DISTINCT = 4.0  # times more is left at any other shift
 
 
@@ -26,7 +28,8 @@ def find_shift(
 
     The static wrench is a function of the angles (m, j): of their sines and cosines where a joint `turns`, else of the
     way, and of these in pairs; without `turns`, of the numbers themselves (elements of a rotation matrix). At the
-    right shift least of the wrench is left beside it. The search covers all shifts at which half of the shorter
+    right shift least of the wrench is left beside it, and beside what goes with the accelerations. Channels that tell
+    it are weighed, and the sigma holds what they differ by. The search covers all shifts at which half of the shorter
     recording has a partner. Valid where motion does not repeat itself within these. Angles that leap there and back for
     less than a tenth of the rows are left out. None where times go back, or leap by
     as much as they take otherwise.
@@ -43,7 +46,7 @@ def find_shift(
         return None
     known = (steps <= _BRIDGED * np.median(steps)) & _between(angle)
 
-    def left(shift: float, times: Array, loads: Array) -> tuple[Array, Array]:
+    def left(shift: float, times: Array, loads: Array, moved: bool = False) -> tuple[Array, Array]:
         at = times + shift
         after = np.searchsorted(t_angle, at)
         inside = (at >= t_angle[0]) & (at <= t_angle[-1]) & known[after.clip(1, len(known)) - 1]
@@ -57,6 +60,9 @@ def find_shift(
         ]
         pairs = (a * b for i, a in enumerate(parts) for b in parts[:i])
         terms = [np.ones(inside.sum()), *(chain(parts, pairs) if turns else q)]
+        if moved:
+            bends = savgol_filter(q, _BEND, 2, deriv=2, mode="nearest")
+            terms += [bend * by for bend in bends for by in (terms[0], *(parts if turns else ()))]
         design = np.stack(terms, axis=1)
         there = loads[inside] - loads[inside].mean(0)
         basis = np.linalg.qr(design)[0]
@@ -82,15 +88,24 @@ def find_shift(
     if curve[best] > _EXPLAINED or low == high or (len(others) and others.min() < _DISTINCT * curve[best]):
         return None
 
-    def share(shift: float) -> float:
-        return float(left(shift, t, wrench)[1][channel])
+    def least(channel: int) -> tuple[float, float]:
+        """Where least of a channel is left, and the sigma of that by its noise alone."""
 
-    found = float(minimize_scalar(share, bounds=(shifts[best] - step, shifts[best] + step), method="bounded").x)
-    residual = left(found, t, wrench)[0][:, channel]
-    near = float((residual[1:] * residual[:-1]).sum() / (residual**2).sum())  # neighbours that err alike
-    bend = (share(found + step) - 2.0 * share(found) + share(found - step)) / step**2
-    spread = 2.0 * share(found) / (max(bend, 1e-300) * len(residual)) * (1.0 + near) / max(1.0 - near, 1e-3)
-    return zero + found, float(np.sqrt(spread))
+        def share(shift: float) -> float:
+            return float(left(shift, *few, True)[1][channel])
+
+        found = float(minimize_scalar(share, bounds=(shifts[best] - step, shifts[best] + step), method="bounded").x)
+        residual = left(found, *few, True)[0][:, channel]
+        near = float((residual[1:] * residual[:-1]).sum() / (residual**2).sum())  # neighbours that err alike
+        bend = (share(found + step) - 2.0 * share(found) + share(found - step)) / step**2
+        spread = 2.0 * share(found) / (max(bend, 1e-300) * len(residual)) * (1.0 + near) / max(1.0 - near, 1e-3)
+        return found, float(np.sqrt(spread))
+
+    found, sigma = np.array([least(one) for one in np.flatnonzero(shares[best] < _EXPLAINED).tolist()]).T
+    weight = 1.0 / np.maximum(sigma, 1e-12) ** 2
+    mean = float((weight * found).sum() / weight.sum())
+    apart = float((weight * (found - mean) ** 2).sum()) / max(1, len(found) - 1)
+    return zero + mean, float(np.sqrt(max(1.0, apart) / weight.sum()))
 
 
 def _between(angle: Array) -> Mask:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from kbs_process.report.panel import Block, Fold, Grid
+from collections.abc import Sequence
+
+from kbs_process.report.panel import Block, Cell, Fold, Grid
 from kbs_process.report.text import band_hz
 from kbs_process.results.judged import Frame, Requirement
-from kbs_process.studies.correlate.results import Band, Recording, Results
+from kbs_process.studies.correlate.results import Band, Merit, Recording, Results
 
 ROLES = ("held-out", "fit", "calibration")
 PLATES = 6  # of recordings, on paper
@@ -71,3 +73,20 @@ def folded(grid: Grid, rest: str) -> tuple[Block, ...]:
     head = Grid(grid.title, grid.head, grid.rows[:_ROWS], grid.align, grid.note)
     tail = Grid(f"{grid.title} (continued)", grid.head, grid.rows[_ROWS:], grid.align)
     return (head, Fold(f"{rest} ({len(tail.rows)} rows)", (tail,)))
+
+
+def pessimistic(rows: Sequence[Merit]) -> Cell:
+    """Whether predicted peaks of these rows are no less than measured ones, and of how many that can be said."""
+    short = [
+        (row.measured_peak - row.predicted_peak, 2.0 * row.sigma)
+        for row in rows
+        if row.sigma is not None and not row.at_the_noise
+        if row.measured_peak is not None and row.predicted_peak is not None
+    ]
+    if not short:
+        return Cell("not testable", "muted")
+    larger = sum(by <= 0.0 for by, _ in short)
+    counted = f"{larger} of {len(short)}"
+    if larger == len(short):
+        return Cell(f"yes, {counted}", "pass")
+    return Cell(f"no, {counted}", "undecided") if any(by > most for by, most in short) else Cell(f"open, {counted}")

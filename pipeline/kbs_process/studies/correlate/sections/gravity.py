@@ -11,7 +11,7 @@ from kbs_process.report import draw
 from kbs_process.report.panel import Block, Cell, Figure, Grid, Panel, Picture, Text
 from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
-from kbs_process.report.text import label, measure, number, unit
+from kbs_process.report.text import element, label, measure, number, unit
 from kbs_process.studies.correlate.results import FittedParameter, Gravity, Results, StaticChannel
 
 _SAYS = Prose("kbs_process.studies.correlate", "gravity")
@@ -58,7 +58,12 @@ def panel(results: Results, tables: Tables) -> Panel:
 
 def _parameters(gravity: Gravity) -> Grid:
     rows = tuple(
-        (entry.name, measure(entry.prior, entry.prior_sigma), measure(entry.value, entry.sigma), unit(entry.unit))
+        (
+            element(entry.name),
+            measure(entry.prior, entry.prior_sigma),
+            measure(entry.value, entry.sigma),
+            unit(entry.unit),
+        )
         for entry in gravity.parameters
     )
     notes = []
@@ -156,7 +161,7 @@ def _shifts(parameters: Sequence[FittedParameter], alt: str) -> Picture:
                 label="fitted, ± 1 σ",
             )
             axis.axvline(0.0, color=draw.RESIDUAL, linewidth=0.7)
-            axis.set_yticks(place, [label(entry.name) for entry in moved[shown]])
+            axis.set_yticks(place, [label(element(entry.name)) for entry in moved[shown]])
             axis.set_ylim(rows - 0.5, -0.5)
             axis.set_xlim(-reach, reach)
             axis.grid(visible=False, axis="y")

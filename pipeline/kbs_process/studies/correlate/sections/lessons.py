@@ -11,9 +11,8 @@ from kbs_process.report.text import percent
 from kbs_process.results.judged import Budget, Frame
 from kbs_process.stages.budget import CORDS, MATRIX, NOISE
 from kbs_process.stages.gravity.error import ANGLES
-from kbs_process.studies.correlate.choose import band_label, main_band
+from kbs_process.studies.correlate.choose import band_label, main_band, pessimistic
 from kbs_process.studies.correlate.results import Merit, Results
-from kbs_process.studies.correlate.sections.merit import pessimistic
 
 _SAYS = Prose("kbs_process.studies.correlate", "lessons")
 _TORQUES = ("Tx", "Ty", "Tz")
@@ -22,7 +21,7 @@ _TORQUES = ("Tx", "Ty", "Tz")
 def panel(results: Results, tables: Tables) -> Panel:
     """A line for each conclusion, with figures that other sections explain; then noise against data."""
     rows = tuple(
-        (_SAYS(f"{name}_paper"), _SAYS(name, **facts(results)), Cell(title, to=key))
+        (_SAYS(f"{name}_paper"), _SAYS(name, **facts(results)), Cell(title, to=f"#{key}"))
         for name, facts, key, title in _LINES
     )
     head = ("The paper, section 8", "This campaign", "Explained in")

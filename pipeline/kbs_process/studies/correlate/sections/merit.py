@@ -12,7 +12,15 @@ from kbs_process.report.panel import Block, Cell, Figure, Fold, Grid, Panel, Pic
 from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
 from kbs_process.report.text import frame_label, label, measure, number, percent, unit
-from kbs_process.studies.correlate.choose import ROLES, band_label, band_names, folded, main_band, main_frame
+from kbs_process.studies.correlate.choose import (
+    ROLES,
+    band_label,
+    band_names,
+    folded,
+    main_band,
+    main_frame,
+    pessimistic,
+)
 from kbs_process.studies.correlate.results import Merit, Results
 
 _SAYS = Prose("kbs_process.studies.correlate", "merit")
@@ -65,23 +73,6 @@ def _pessimistic(results: Results) -> Grid:
     ]
     head = ("Is the prediction pessimistic?", *map(label, channels))
     return Grid("Pessimism by channel", head, tuple(rows), "l" + "c" * len(channels), _SAYS("pessimistic_note"))
-
-
-def pessimistic(rows: Sequence[Merit]) -> Cell:
-    """Whether predicted peaks of these rows are no less than measured ones, and of how many that can be said."""
-    short = [
-        (row.measured_peak - row.predicted_peak, 2.0 * row.sigma)
-        for row in rows
-        if row.sigma is not None and not row.at_the_noise
-        if row.measured_peak is not None and row.predicted_peak is not None
-    ]
-    if not short:
-        return Cell("not testable", "muted")
-    larger = sum(by <= 0.0 for by, _ in short)
-    counted = f"{larger} of {len(short)}"
-    if larger == len(short):
-        return Cell(f"yes, {counted}", "pass")
-    return Cell(f"no, {counted}", "undecided") if any(by > most for by, most in short) else Cell(f"open, {counted}")
 
 
 def _rank(results: Results, row: Merit, main: tuple[str, str]) -> tuple[bool, int, str]:
@@ -138,7 +129,7 @@ def _peaks(rows: Sequence[Merit], alt: str) -> Picture:
             shown = [row for row in rows if row.unit == name]
             measured = np.array([row.measured_peak for row in shown], dtype=float)
             predicted = np.array([row.predicted_peak for row in shown], dtype=float)
-            low = 0.6 * float(min(measured.min(), predicted.min()))
+            low = 0.3 * float(min(measured.min(), predicted.min()))
             high = 1.6 * float(max(measured.max(), predicted.max()))
             axis.fill_between([low, high], [low, high], [high, high], color="#f4efe6", linewidth=0)
             axis.plot([low, high], [low, high], color=draw.RESIDUAL, linewidth=0.8)
