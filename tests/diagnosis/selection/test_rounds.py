@@ -26,6 +26,7 @@ from kbs_process.diagnosis.experiments.hypothesis import Hypothesis, Simulate, p
 from kbs_process.diagnosis.experiments.thresholds import told_apart
 from kbs_process.diagnosis.facts import Identity, Place
 from kbs_process.diagnosis.nominal.joint import Own, Standing, with_extra
+from kbs_process.diagnosis.nominal.known import Strain
 from kbs_process.diagnosis.nominal.scatter import scattered
 from kbs_process.diagnosis.nominal.settling import detected
 from kbs_process.diagnosis.proposing.tryout import extra_of, identity
@@ -385,14 +386,9 @@ def test_a_search_that_has_cost_too_much_ends_with_what_it_has_found(
     assert [one.identity.law for one in done.finds] == ["ground_cable"]
 
 
-@pytest.mark.parametrize(("count", "believes", "left", "looks"), [
-    (1, True, True, 0),  # what smoothing proposes and the plant believes is all
-    (1, False, True, 1),
-    (0, False, True, 1),
-    (0, False, False, 0),  # nothing is proposed, and nothing is left
-])  # fmt: skip
-def test_the_plant_s_own_search_is_for_what_smoothing_does_not_find(
-    cable: Standing, monkeypatch: pytest.MonkeyPatch, count: int, believes: bool, left: bool, looks: int
+@pytest.mark.parametrize(("count", "believes"), [(1, True), (1, False), (0, False)])
+def test_where_smoothing_has_looked_nothing_else_is_searched(
+    cable: Standing, monkeypatch: pytest.MonkeyPatch, count: int, believes: bool
 ) -> None:
     tried, scene, found = screened(cable)
     first = passed(cable, tried, scene, found, "ground_cable")
@@ -414,16 +410,19 @@ def test_the_plant_s_own_search_is_for_what_smoothing_does_not_find(
     monkeypatch.setattr(rounds, "numbers_beside", lambda *_: cable)
     monkeypatch.setattr(rounds, "nothing", lambda *_: rounds.Round(None, cable, cable, found, Noted(), None))
     monkeypatch.setattr(rounds, "drawn_back", lambda one, *_: one)
-    monkeypatch.setattr(rounds, "_goes_on", lambda *_: left)
     monkeypatch.setattr(rounds, "place_of", lambda *_: None)
     monkeypatch.setattr(rounds, "needed", lambda accepted, here, *_: (accepted, here, ()))
-    smoothed = cast("Smoothed", SimpleNamespace(proposals=(None,) * count))
+    alone, beside = Strain(500.0, 50), Strain(50.0, 50)
+    fits = {"alone": SimpleNamespace(strain=alone), "beside": SimpleNamespace(strain=beside)}
+    smoothed = cast("Smoothed", SimpleNamespace(proposals=(None,) * count, **fits))
     experiment = cable.known.experiment
     floor, search = declared(experiment), Effort(bench.serial(experiment), cable.known)
     before = detected(cable, floor, experiment.fit)
     done = rounds._diagnosed(cable.known, floor, search, before, smoothed)
-    assert len(asked) == looks
+    assert asked == []
     assert len(done.finds) == (1 if believes else 0)
+    # Whether numbers are off together is told beside what is believed.
+    assert done.strain == (beside if believes else alone)
 
 
 def _lower(standing: Standing, share: float) -> Standing:
