@@ -85,3 +85,11 @@ def test_what_is_missing_is_said(missing: str) -> None:
     empty = {"gravity": None, "transducer": None, "merit": (), "six_channels": ()}[missing]
     found = lines(msgspec.structs.replace(results(), **{missing: empty}))
     assert any("ot answered" in line or "not tested" in line for line in found)
+
+
+def test_a_fit_of_forces_alone_leaves_no_torque_to_tell() -> None:
+    found = results()
+    assert found.gravity is not None
+    forces = tuple(msgspec.structs.replace(rung, rms={"Fz": 0.1}) for rung in found.gravity.ladder)
+    told = lines(msgspec.structs.replace(found, gravity=msgspec.structs.replace(found.gravity, ladder=forces)))
+    assert told[0].startswith("Not answered")

@@ -38,10 +38,10 @@ def panel(results: Results, tables: Tables) -> Panel:
 
 
 def _fit(results: Results) -> dict[str, object]:
-    """The first rung and the last, on the torque that each leaves most of."""
+    """The first rung and the last, on the torque that each leaves most of; none of a rig that reads no torques."""
     ladder = () if results.gravity is None else results.gravity.ladder
-    worst = [max((rung.rms[name], name) for name in rung.rms if name in _TORQUES) for rung in ladder]
-    return {"ladder": ladder, "worst": worst}
+    torques = [(rung, [(rms, name) for name, rms in rung.rms.items() if name in _TORQUES]) for rung in ladder]
+    return {"ladder": [rung for rung, own in torques if own], "worst": [max(own) for _, own in torques if own]}
 
 
 def _slow(results: Results) -> dict[str, object]:
