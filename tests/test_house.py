@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "pipeline" / "kbs_process"
 MOST_MODULES = 15  # of a folder, beside its __init__.py
-MOST_LINES = 65_357
+MOST_LINES = 65_367
 FOLDERS = sorted(path.parent for path in PACKAGE.rglob("__init__.py"))
 
 

@@ -9,7 +9,8 @@ from engine import TRAJECTORIES
 
 # deg/s^2, out of the flight's envelope
 QUICK = {
-    "AZPS_ATA": 0.15, "AZPS_RESTS": 0.4, "AL012M00": 0.25, "ALSTPP00": 0.25, "SWPAZ000": 0.03, "SWPEL000": 0.03
+    "AZPS_ATA": 0.15, "AZPS_RESTS": 0.4, "AZPS_SHORT": 1.0,
+    "AL012M00": 0.25, "ALSTPP00": 0.25, "SWPAZ000": 0.03, "SWPEL000": 0.03
 }  # fmt: skip
 
 

@@ -40,7 +40,9 @@ def results() -> Results:
 
 def lines(found: Results) -> list[str]:
     """What stands beside each of the paper's conclusions."""
-    grid = panel(found, NOWHERE).blocks[0]
+    made = panel(found, NOWHERE)
+    assert made is not None
+    grid = made.blocks[0]
     assert isinstance(grid, Grid)
     return [str(row[1]).replace("\u00a0", " ") for row in grid.rows]
 
@@ -60,14 +62,18 @@ def test_each_line_has_this_campaigns_figure() -> None:
 @pytest.mark.slow  # draws every section
 def test_lines_lead_to_sections_of_the_report() -> None:
     found = sample.command_results()
-    grid = panel(found, NOWHERE).blocks[0]
+    made = panel(found, NOWHERE)
+    assert made is not None
+    grid = made.blocks[0]
     assert isinstance(grid, Grid)
     sections = {made.key for make in DOCUMENT.panels if (made := make(found, NOWHERE)) is not None}
     assert {cell.to.removeprefix("#") for row in grid.rows for cell in row if isinstance(cell, Cell)} <= sections
 
 
 def test_noise_is_told_of_each_trajectory() -> None:
-    table = panel(results(), NOWHERE).blocks[1]
+    made = panel(results(), NOWHERE)
+    assert made is not None
+    table = made.blocks[1]
     assert isinstance(table, Grid)
     assert [[str(cell).replace("\u00a0", " ") for cell in row] for row in table.rows] == [
         ["EL089P00", "60 %", "60 %", "60 %"]
@@ -85,6 +91,10 @@ def test_what_is_missing_is_said(missing: str) -> None:
     empty = {"gravity": None, "transducer": None, "merit": (), "six_channels": ()}[missing]
     found = lines(msgspec.structs.replace(results(), **{missing: empty}))
     assert any("ot answered" in line or "not tested" in line for line in found)
+
+
+def test_rigs_without_a_spacecraft_have_none() -> None:
+    assert panel(msgspec.structs.replace(results(), merit=(), requirements=()), NOWHERE) is None
 
 
 def test_a_fit_of_forces_alone_leaves_no_torque_to_tell() -> None:

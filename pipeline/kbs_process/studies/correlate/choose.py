@@ -75,6 +75,11 @@ def folded(grid: Grid, rest: str) -> tuple[Block, ...]:
     return (head, Fold(f"{rest} ({len(tail.rows)} rows)", (tail,)))
 
 
+def at_spacecraft(results: Results) -> bool:
+    """Whether anything is said of the spacecraft's centre of mass."""
+    return "S" in {row.frame for row in results.merit} | {row.frame for row in results.requirements}
+
+
 def pessimistic(rows: Sequence[Merit]) -> Cell:
     """Whether predicted peaks of these rows are no less than measured ones, and of how many that can be said."""
     short = [

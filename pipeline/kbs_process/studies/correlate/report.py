@@ -87,7 +87,7 @@ DOCUMENT = Document(
         compliance.panel,
         disturbance.panel,
         merit.panel,
-        _on_transducer(lessons.panel),
+        lessons.panel,
         densities.panel,
         orders.panel,
         diagnosed.panel,

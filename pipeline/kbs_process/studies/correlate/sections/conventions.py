@@ -11,6 +11,7 @@ from kbs_process.report.prose import Prose
 from kbs_process.report.tables import Tables
 from kbs_process.signals.records import Array
 from kbs_process.stages.conventions import SignCheck
+from kbs_process.studies.correlate.choose import at_spacecraft
 from kbs_process.studies.correlate.results import Results
 
 _SAYS = Prose("kbs_process.studies.correlate", "conventions")
@@ -22,8 +23,7 @@ _AXES = (("x", draw.SERIES[5]), ("y", draw.SERIES[2]), ("z", draw.SERIES[0]))
 
 def panel(results: Results, tables: Tables) -> Panel:
     """Definitions, the drawing, and the outcome of every self-test."""
-    frames_used = {row.frame for row in results.merit} | {row.frame for row in results.requirements}
-    spacecraft = "S" in frames_used
+    spacecraft = at_spacecraft(results)
     picture = _frames("Frame T with its axes and positive torques", spacecraft=spacecraft)
     names = ("transducer", "wrench", "torques", *(("spacecraft",) if spacecraft else ()))
     blocks: list[Block] = [

@@ -11,15 +11,20 @@ from kbs_process.report.text import percent
 from kbs_process.results.judged import Budget, Frame
 from kbs_process.stages.budget import CORDS, MATRIX, NOISE
 from kbs_process.stages.gravity.error import ANGLES
-from kbs_process.studies.correlate.choose import band_label, main_band, pessimistic
+from kbs_process.studies.correlate.choose import at_spacecraft, band_label, main_band, pessimistic
 from kbs_process.studies.correlate.results import Merit, Results
 
 _SAYS = Prose("kbs_process.studies.correlate", "lessons")
 _TORQUES = ("Tx", "Ty", "Tz")
 
 
-def panel(results: Results, tables: Tables) -> Panel:
-    """A line for each conclusion, with figures that other sections explain; then noise against data."""
+def panel(results: Results, tables: Tables) -> Panel | None:
+    """A line for each conclusion, with figures that other sections explain; then noise against data.
+
+    Only of a rig that stands for a mechanism on a spacecraft, as the paper's did.
+    """
+    if not at_spacecraft(results):
+        return None
     rows = tuple(
         (_SAYS(f"{name}_paper"), _SAYS(name, **facts(results)), Cell(title, to=f"#{key}"))
         for name, facts, key, title in _LINES
