@@ -64,7 +64,7 @@ def test_names_in_an_error_make_no_line_of_it_and_several_errors_have_theirs() -
     assert len(lines) == 5 and all(line.isprintable() for line in lines)
 
 
-@pytest.mark.parametrize("verb", [["inspect"], ["import", "--describe"], ["import", "emps", "{}", "a"], ["nosuch"]])
+@pytest.mark.parametrize("verb", [["inspect"], ["import", "--describe"], ["import", "emps", "{}", "a"], ["process"]])
 def test_no_name_of_a_file_makes_a_line(verb: list[str], tmp_path: Path) -> None:
     name = f"{tmp_path}/no\x1b[2Jne\nfake: clean"
     words = [word.format(name) for word in verb]
