@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -48,6 +50,19 @@ def test_waves_beyond_what_a_contact_has_are_no_reason_for_one_without_width() -
     for name in ("b_m", "d0", "Ts0", "delta"):
         given = drive.parameters[name]
         assert found[name] == pytest.approx(float(given), abs=float(given.sigma)), name
+
+
+@pytest.mark.parametrize("absent", [("tcog",), ("d1",), ("Ts0",), ("tcog", "d1", "Ts0", "d0")])
+def test_what_a_drive_is_known_not_to_have_it_has_not(absent: tuple[str, ...]) -> None:
+    drive = _drive()
+    nothing = {name: Quantity(name, np.array(0.0), "", np.array(0.0), "") for name in absent}
+    drive = replace(drive, parameters=drive.parameters | nothing)
+    mean, spread = priors(drive)
+    known = np.diag(np.where(spread > 0.0, 0.5 * spread**2, 1e-24))
+    found = dict(zip(_PARAMETERS, parameters_of(drive, mean, known), strict=True))
+    assert all(np.isfinite(value) for value in found.values())
+    for name in absent:
+        assert found[name] == pytest.approx(0.0, abs=1e-9)
 
 
 _PARAMETERS = ("b_m", "d0", "tcog", "phi_cog", "d1", "phi_dyn", "Ts0", "delta", "phi_stat")

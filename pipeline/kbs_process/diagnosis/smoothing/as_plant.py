@@ -65,7 +65,7 @@ def parameters_of(drive: Drive, numbers: Array, covariance: Array) -> Array:
         files have them.
     """
     mean, spread = priors(drive)
-    spread = np.maximum(spread, _EXACT * np.abs(mean))
+    spread = np.where(spread > 0.0, spread, _EXACT**2)  # as they were fitted
     inverse = np.linalg.inv(covariance)
     told, directions = np.linalg.eigh(inverse - np.diag(spread**-2.0))
     told = np.sqrt(np.maximum(told, 0.0))
@@ -75,7 +75,7 @@ def parameters_of(drive: Drive, numbers: Array, covariance: Array) -> Array:
     value = np.array([0.0 if one is None else float(one) for one in given])
     sigma = np.array([np.inf if one is None else float(one.sigma) for one in given])
     sigma[[name in _PHASES for name in _OF_PLANT]] = np.inf
-    sigma = np.maximum(sigma, _EXACT * np.abs(value))
+    sigma = np.maximum(sigma, np.maximum(_EXACT * np.abs(value), _EXACT**2))
 
     def left(p: Array) -> Array:
         return np.concatenate([told * (directions.T @ numbers_of(p)) - seen, (p - value) / sigma])
