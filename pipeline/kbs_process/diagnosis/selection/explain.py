@@ -123,11 +123,10 @@ def _smoothed(experiment: Experiment, simulate: Simulate, task: Task) -> Explain
     with task("Motion, numbers and forces of all recordings"):
         try:
             found = search(experiment)
+            start = hypothesis_of(found.beside if found.proposals else found.alone)
         except np.linalg.LinAlgError:
             return None
-    fitted = found.beside if found.proposals else found.alone
     with task("Repeatability"):
-        start = hypothesis_of(fitted)
         there = predicted_by(experiment, start, simulate)
         if not all(np.isfinite(one.values).all() for one in there.values()):
             return None
